@@ -1,1 +1,1 @@
-"""What is on the wire: frames, byte codecs, the passive decoder and the live state. Pure, no clock."""
+"""What is on the wire: frames, byte codecs, passive decoders, the live state. Pure."""

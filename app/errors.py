@@ -1,0 +1,187 @@
+"""The one tree of errors. Every error has a code, a text key for the operator and named details.
+
+::
+
+    HubsideError
+    ├── UsageError                 exit 2   the command or file does not make sense
+    │   ├── DescriptionError                a description or EDS file: file, line, reason
+    │   ├── SiteError                       a site file: file, key, reason
+    │   └── SetFileError                    a parameter-set file: file, line, reason
+    ├── RefusedError               exit 3   refused by us, nothing was sent
+    │   ├── UnknownObjectError              the description has no such address
+    │   ├── AccessError                     read-only, write-only or factory object
+    │   ├── ValueTypeError                  the value does not fit the data type
+    │   ├── LimitError                      the value is out of range; names the limit
+    │   ├── PreconditionError               another object or state forbids it
+    │   └── ConsentError                    active access needs consent (other master seen)
+    ├── DeviceError                exit 4   the device answered and refused
+    │   ├── SdoAbortError                   CiA 301 abort code
+    │   └── IdentityError                   another device than expected answered
+    ├── NoAnswerError              exit 5   nothing came in time
+    │   ├── BusLostError                    the adapter or its server is gone
+    │   └── BusOpenError                    the adapter could not be opened
+    ├── UnverifiedError            exit 6   sent, but what was read back differs or could not be read
+    ├── RecordingError             exit 2   a recording is damaged or cannot be written
+    └── ProtocolError              exit 4   bytes on the wire that no rule of the protocol allows
+
+The exit codes are those of the command line.
+"""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+
+class HubsideError(Exception):
+    """Base of all errors that the tool raises on purpose.
+
+    ``code`` is stable and machine-readable; ``text_key`` names the operator's text in ``app/locales``;
+    ``details`` fills the placeholders of that text.
+    """
+
+    code: ClassVar[str] = "error"
+    exit_code: ClassVar[int] = 1
+
+    def __init__(self, **details: Any) -> None:
+        self.details = details
+        super().__init__(", ".join(f"{key}={value}" for key, value in details.items()))
+
+    @property
+    def text_key(self) -> str:
+        """Key of the operator's text in the locale catalogue."""
+        return f"error.{self.code}"
+
+
+class UsageError(HubsideError):
+    """The command or file does not make sense. Details: reason."""
+
+    code = "usage"
+    exit_code = 2
+
+
+class DescriptionError(UsageError):
+    """A description or EDS file is wrong. Details: file, line, reason."""
+
+    code = "description"
+
+
+class SiteError(UsageError):
+    """A site file is wrong. Details: file, key, reason."""
+
+    code = "site"
+
+
+class SetFileError(UsageError):
+    """A parameter-set file is wrong. Details: file, line, reason."""
+
+    code = "set_file"
+
+
+class RefusedError(HubsideError):
+    """Refused before anything was sent. Details: device, address, reason."""
+
+    code = "refused"
+    exit_code = 3
+
+
+class UnknownObjectError(RefusedError):
+    """The description has no such address. Details: device, address."""
+
+    code = "unknown_object"
+
+
+class AccessError(RefusedError):
+    """The object's access forbids it. Details: address, name, access."""
+
+    code = "access"
+
+
+class ValueTypeError(RefusedError):
+    """The value does not fit the data type. Details: address, name, type, value."""
+
+    code = "value_type"
+
+
+class LimitError(RefusedError):
+    """The value is out of range. Details: address, name, value, minimum, maximum, unit."""
+
+    code = "limit"
+
+
+class PreconditionError(RefusedError):
+    """Another object or the device's state forbids it. Details: address, name, needs, found."""
+
+    code = "precondition"
+
+
+class ConsentError(RefusedError):
+    """Active access needs consent: another master is on the bus. Details: bus, seen."""
+
+    code = "consent"
+
+
+class DeviceError(HubsideError):
+    """The device answered and refused. Details: node, reason."""
+
+    code = "device"
+    exit_code = 4
+
+
+class SdoAbortError(DeviceError):
+    """The device aborted an SDO transfer (CiA 301, 7.2.4.3.17).
+
+    Details: node, address, abort_code (int), text_key_reason.
+    """
+
+    code = "sdo_abort"
+
+    @property
+    def abort_code(self) -> int:
+        """The 32-bit abort code."""
+        return int(self.details["abort_code"])
+
+
+class IdentityError(DeviceError):
+    """Another device than the expected one answered. Details: node, expected, found."""
+
+    code = "identity"
+
+
+class NoAnswerError(HubsideError):
+    """Nothing came in time. Details: node, address, timeout_s."""
+
+    code = "no_answer"
+    exit_code = 5
+
+
+class BusLostError(NoAnswerError):
+    """The adapter or its server is gone. Details: bus, reason."""
+
+    code = "bus_lost"
+
+
+class BusOpenError(NoAnswerError):
+    """The adapter could not be opened. Details: bus, reason."""
+
+    code = "bus_open"
+
+
+class UnverifiedError(HubsideError):
+    """Sent, but not verified. Details: address, name, sent, found, reason."""
+
+    code = "unverified"
+    exit_code = 6
+
+
+class RecordingError(HubsideError):
+    """A recording is damaged or cannot be written. Details: file, offset, reason."""
+
+    code = "recording"
+    exit_code = 2
+
+
+class ProtocolError(HubsideError):
+    """Bytes on the wire that no rule of the protocol allows. Details: bus, reason."""
+
+    code = "protocol"
+    exit_code = 4

@@ -1,0 +1,311 @@
+"""What a device IS: the description of every parameter, as read from ``od/*.toml``.
+
+Everything else is derived from these objects: EDS files, forms of the page, the twins' dictionaries, documents.
+The same shapes serve index/sub-index (CiA 301) and IND/PNU (PROFIBUS PKW).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from decimal import Decimal
+from enum import Enum
+from typing import Final
+
+from app.errors import UnknownObjectError
+from app.model.address import Address, Addressing
+from app.model.datatypes import DataType, Raw
+
+Lookup = Callable[[Address], Raw | None]
+"""Gives the latest known raw value of another object of the same device, or None."""
+
+
+class Bus(Enum):
+    """The bus a device speaks."""
+
+    CANOPEN = "canopen"
+    MODBUS_TCP = "modbus-tcp"
+    PROFIBUS_DP = "profibus-dp"
+
+
+class Kind(Enum):
+    """Object code of CiA 301 (7.4.3); a PKW parameter is a VAR."""
+
+    VAR = "var"
+    ARRAY = "array"
+    RECORD = "record"
+
+
+class Access(Enum):
+    """Access as the manuals print it; ``r(w)`` is writable by the maker only."""
+
+    RO = "ro"
+    WO = "wo"
+    RW = "rw"
+    FACTORY = "r(w)"
+    CONST = "const"
+
+    @property
+    def readable(self) -> bool:
+        """True where a read is allowed."""
+        return self is not Access.WO
+
+    @property
+    def writable(self) -> bool:
+        """True where a write is allowed in normal operation."""
+        return self in (Access.RW, Access.WO)
+
+
+class RestoreClass(Enum):
+    """Where a value of a parameter set may be written back to."""
+
+    COPY = "copy"
+    UNIT = "unit"
+    FACTORY = "factory"
+    NEVER = "never"
+
+
+class Verify(Enum):
+    """How a write is proven."""
+
+    EQUAL = "equal"
+    ACK = "ack"
+    EFFECT = "effect"
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """Unit and factor: scaled = raw x scale."""
+
+    unit: str = ""
+    scale: Decimal = Decimal(1)
+
+
+@dataclass(frozen=True, slots=True)
+class QuantityRule:
+    """A unit that depends on other objects.
+
+    Either a table of the raw value of ``address`` (``choices``), or the rule ``feed`` of CiA 402: a position in units
+    of ``feed`` per ``shaft`` revolutions, shown in degrees: 360 / (feed / shaft) degrees a unit.
+    """
+
+    address: Address
+    choices: Mapping[int, Quantity] = field(default_factory=dict)
+    shaft: Address | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class LimitRef:
+    """A limit that is the raw value of another object, times ``factor``."""
+
+    address: Address
+    factor: Decimal = Decimal(1)
+
+
+Limit = int | Decimal | LimitRef
+
+
+@dataclass(frozen=True, slots=True)
+class Condition:
+    """A write is allowed only while the object at ``address`` holds one of ``values``."""
+
+    address: Address
+    values: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Mirror:
+    """The object shows the low bits of ``of``, divided by ``divisor``."""
+
+    of: Address
+    divisor: int = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Bit:
+    """One bit, or a field of bits ``bit..last``, of a bit table."""
+
+    bit: int
+    name: str
+    text_key: str
+    last: int | None = None
+    clamp: str = ""
+    error_code: int | None = None
+
+    @property
+    def mask(self) -> int:
+        """The bits that belong to it."""
+        last = self.bit if self.last is None else self.last
+        return (1 << last + 1) - (1 << self.bit)
+
+
+@dataclass(frozen=True, slots=True)
+class BitTable:
+    """Names of the bits of an object. Bits that are not named are reserved."""
+
+    id: str
+    bits: tuple[Bit, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class EnumValue:
+    """One value of an enumeration."""
+
+    value: int
+    name: str
+    text_key: str
+
+
+@dataclass(frozen=True, slots=True)
+class Enumeration:
+    """Names of values. Where ``exclusive``, no other value may be written; else others are plain numbers."""
+
+    id: str
+    values: tuple[EnumValue, ...]
+    exclusive: bool = True
+
+    def by_value(self, value: int) -> EnumValue | None:
+        """The named value, or None."""
+        return next((v for v in self.values if v.value == value), None)
+
+
+@dataclass(frozen=True, slots=True)
+class ErrorCode:
+    """An error code of the device (EMCY, error field) with its text."""
+
+    code: int
+    name: str
+    text_key: str
+    reaction: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class VariantValues:
+    """What differs in one variant of the device; None where nothing differs."""
+
+    default: Raw | None = None
+    minimum: Limit | None = None
+    maximum: Limit | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """One row of a dictionary: one sub-index, or one PNU.
+
+    ``default``, ``minimum`` and ``maximum`` are raw values; where ``node_id``, the node's number is added to the
+    default ($NODEID of CiA 306). ``inferred`` marks what the manual does not print. ``line`` is the row's line in its file.
+    """
+
+    address: Address
+    name: str
+    object_name: str
+    kind: Kind
+    type: DataType
+    access: Access
+    pdo: bool
+    default: Raw | None
+    saved: bool
+    group: str
+    section: str
+    quantity: Quantity = Quantity()
+    quantity_rule: QuantityRule | None = None
+    minimum: Limit | None = None
+    maximum: Limit | None = None
+    enumeration: str | None = None
+    bits: str | None = None
+    restore: RestoreClass = RestoreClass.NEVER
+    verify: Verify = Verify.EQUAL
+    save_category: str | None = None
+    requires: tuple[Condition, ...] = ()
+    mirror: Mirror | None = None
+    variants: Mapping[str, VariantValues] = field(default_factory=dict)
+    note: str | None = None
+    inferred: bool = False
+    timeout_s: float | None = None
+    hexadecimal: bool = False
+    node_id: bool = False
+    line: int = 0
+
+    @property
+    def title(self) -> str:
+        """Name for people: the object's name, and the sub-index's where there is one."""
+        return self.name if self.kind is Kind.VAR else f"{self.object_name}: {self.name}"
+
+
+@dataclass(frozen=True, slots=True)
+class SaveCommand:
+    """How RAM values become non-volatile: ``signature`` is written to ``address``.
+
+    ``category`` None saves (or restores) all.
+    """
+
+    address: Address
+    signature: int
+    category: str | None = None
+    timeout_s: float = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class Match:
+    """How a device on the bus is recognised: 1000h and a piece of 1008h; None matches anything."""
+
+    device_type: int | None = None
+    device_name: str | None = None
+    vendor_id: int | None = None
+    product_code: int | None = None
+
+
+@dataclass(frozen=True)
+class Description:
+    """A device: all its entries in the order of their addresses, its tables and commands."""
+
+    id: str
+    version: str
+    name: str
+    vendor: str
+    bus: Bus
+    addressing: Addressing
+    manual: str
+    match: Match
+    entries: Mapping[Address, Entry]
+    groups: tuple[str, ...]
+    bit_tables: Mapping[str, BitTable]
+    enumerations: Mapping[str, Enumeration]
+    errors: Mapping[int, ErrorCode]
+    save: tuple[SaveCommand, ...]
+    load: tuple[SaveCommand, ...]
+    variants: tuple[str, ...] = ()
+
+    def __iter__(self) -> Iterator[Entry]:
+        return iter(self.entries.values())
+
+    def entry(self, address: Address) -> Entry:
+        """The entry at ``address``. Raises UnknownObjectError."""
+        found = self.entries.get(address)
+        if found is None:
+            raise UnknownObjectError(device=self.id, address=address.short)
+        return found
+
+    def has_index(self, index: int) -> bool:
+        """True where any sub-index of ``index`` exists."""
+        return index in self._indices
+
+    def objects(self) -> Iterator[tuple[int, list[Entry]]]:
+        """Each index with its entries, sub 0 first."""
+        yield from self._indices.items()
+
+    @property
+    def _indices(self) -> Mapping[int, list[Entry]]:
+        cached: dict[int, list[Entry]] | None = self.__dict__.get("_by_index")
+        if cached is None:
+            cached = {}
+            for entry in self.entries.values():
+                cached.setdefault(entry.address.major, []).append(entry)
+            object.__setattr__(self, "_by_index", cached)
+        return cached
+
+
+SAVE_SIGNATURE: Final = 0x65766173
+"""'save' as an UNSIGNED32 (CiA 301, 7.5.2.13)."""
+LOAD_SIGNATURE: Final = 0x64616F6C
+"""'load' as an UNSIGNED32 (CiA 301, 7.5.2.14)."""

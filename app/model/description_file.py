@@ -1,0 +1,454 @@
+"""Reads a device description (``od/*.toml``, schema 1) and says file, line and reason where it is wrong.
+
+``load`` raises on the first error; ``problems`` lists all that can be found in one go.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+from enum import Enum
+from functools import cache
+from pathlib import Path
+from typing import Any, Final, TypeVar
+
+from app.errors import DescriptionError, UsageError
+from app.model.address import Address, Addressing, parse_address
+from app.model.datatypes import DataType, Raw, encode_raw
+from app.model.description import (
+    Access,
+    Bit,
+    BitTable,
+    Bus,
+    Condition,
+    Description,
+    Entry,
+    Enumeration,
+    EnumValue,
+    ErrorCode,
+    Kind,
+    Limit,
+    LimitRef,
+    Match,
+    Mirror,
+    Quantity,
+    QuantityRule,
+    RestoreClass,
+    SaveCommand,
+    VariantValues,
+    Verify,
+)
+from app.model.toml_lines import TomlLines
+
+SCHEMA: Final = 1
+BUILTIN: Final = {
+    "oat-pmm": "oat_pmm.toml",
+    "oat-pmc": "oat_pmc.toml",
+    "nanotec-pd4e": "nanotec_pd4e.toml",
+    "wandfluh-ed2": "wandfluh_ed2.toml",
+}
+
+_TOP_KEYS: Final = frozenset(
+    "schema id version name vendor bus addressing manual match save load variant group bit_table enumeration error "
+    "object".split()
+)
+_OWN_KEYS: Final = frozenset(("index", "ind", "pnu", "kind", "subs", "elements"))
+_ROW_KEYS: Final = frozenset(
+    "name section group type access pdo default saved save_category unit scale hex unit_from min max enumeration bits "
+    "restore verify requires mirror by_variant note inferred timeout_s node_id".split()
+)
+_NOT_INHERITED_BY_SUB0: Final = _ROW_KEYS - {"section", "group", "saved", "save_category", "inferred"}
+_E = TypeVar("_E", bound=Enum)
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """One thing that is wrong in a description file."""
+
+    file: str
+    line: int
+    reason: str
+
+    def __str__(self) -> str:
+        return f"{self.file}:{self.line}: {self.reason}"
+
+
+class _WrongError(Exception):
+    """A problem found while one table is read; ``line`` is filled in by the caller that knows it."""
+
+
+def load(path: Path) -> Description:
+    """Read the description at ``path``. Raises DescriptionError with file, line and reason."""
+    description, found = _read(path)
+    if found or description is None:
+        first = found[0]
+        raise DescriptionError(file=first.file, line=first.line, reason=first.reason)
+    return description
+
+
+def problems(path: Path) -> list[Problem]:
+    """Everything that is wrong in the file at ``path``, by line; empty where it is right."""
+    return sorted(_read(path)[1], key=lambda problem: problem.line)
+
+
+def builtin_folder() -> Path:
+    """The folder of the descriptions: beside the package in a checkout, inside it in a wheel."""
+    package = Path(__file__).resolve().parent.parent
+    bundled = package / "_bundle" / "od"
+    return bundled if bundled.is_dir() else package.parent / "od"
+
+
+@cache
+def load_builtin(description_id: str) -> Description:
+    """One of our own descriptions by its id. Raises UsageError where there is none."""
+    if description_id not in BUILTIN:
+        raise UsageError(reason=f"no description '{description_id}' (there are: {', '.join(BUILTIN)})")
+    return load(builtin_folder() / BUILTIN[description_id])
+
+
+def _read(path: Path) -> tuple[Description | None, list[Problem]]:
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        return None, [Problem(str(path), 0, f"cannot be read: {error}")]
+    try:
+        data = tomllib.loads(text, parse_float=Decimal)
+    except tomllib.TOMLDecodeError as error:
+        line = getattr(error, "lineno", None) or TomlLines.line_of_error(str(error))
+        return None, [Problem(str(path), line, f"no valid TOML: {error}")]
+    reader = _Reader(str(path), data, TomlLines(text))
+    return reader.description(), reader.problems
+
+
+class _Reader:
+    """Turns the parsed tables into a Description, collecting problems with their lines."""
+
+    def __init__(self, file: str, data: Mapping[str, Any], lines: TomlLines) -> None:
+        self._file = file
+        self._data = data
+        self._lines = lines
+        self.problems: list[Problem] = []
+        self._addressing = Addressing.OD
+
+    def _say(self, line: int, reason: str) -> None:
+        self.problems.append(Problem(self._file, line, reason))
+
+    def description(self) -> Description | None:
+        """The whole file; None where its head is unusable."""
+        data = self._data
+        if data.get("schema") != SCHEMA:
+            self._say(self._lines.key("schema"), f"schema is {data.get('schema')!r}, this version reads {SCHEMA}")
+            return None
+        for key in data.keys() - _TOP_KEYS:
+            self._say(self._lines.key(key), f"unknown key '{key}'")
+        try:
+            self._addressing = _enum(Addressing, data.get("addressing", "od"), "addressing")
+            bus = _enum(Bus, data.get("bus"), "bus")
+            head = {key: _text(data, key) for key in ("id", "version", "name", "vendor", "manual")}
+        except _WrongError as error:
+            self._say(1, str(error))
+            return None
+        description = Description(
+            **head,
+            bus=bus,
+            addressing=self._addressing,
+            match=Match(**data.get("match", {})),
+            entries=self._entries(),
+            groups=tuple(str(group.get("id")) for group in data.get("group", ())),
+            bit_tables={table.id: table for table in self._tables("bit_table", _bit_table)},
+            enumerations={table.id: table for table in self._tables("enumeration", _enumeration)},
+            errors={code.code: code for code in self._tables("error", _error_code)},
+            save=tuple(self._tables("save", _save_command)),
+            load=tuple(self._tables("load", _save_command)),
+            variants=tuple(str(variant.get("id")) for variant in data.get("variant", ())),
+        )
+        self._cross_check(description)
+        return description
+
+    def _tables(self, key: str, read: Any) -> Iterator[Any]:
+        for number, table in enumerate(self._data.get(key, ())):
+            try:
+                yield read(table)
+            except (_WrongError, UsageError, KeyError, TypeError, ValueError) as error:
+                self._say(self._lines.table(key, number), f"[[{key}]]: {_reason(error)}")
+
+    def _entries(self) -> dict[Address, Entry]:
+        found: dict[Address, Entry] = {}
+        for number, table in enumerate(self._data.get("object", ())):
+            line = self._lines.table("object", number)
+            try:
+                rows = list(self._rows(table, number, line))
+            except (_WrongError, UsageError, KeyError, TypeError, ValueError) as error:
+                self._say(line, f"[[object]]: {_reason(error)}")
+                continue
+            for entry in rows:
+                if entry.address in found:
+                    first = found[entry.address].line
+                    self._say(entry.line, f"{entry.address.short} stands twice (first in line {first})")
+                found[entry.address] = entry
+        return dict(sorted(found.items()))
+
+    def _rows(self, table: Mapping[str, Any], number: int, line: int) -> Iterator[Entry]:
+        for key in table.keys() - _ROW_KEYS - _OWN_KEYS:
+            self._say(self._lines.key_in("object", number, key), f"unknown key '{key}'")
+        kind = _enum(Kind, table.get("kind", "var"), "kind")
+        inherited = {key: value for key, value in table.items() if key in _ROW_KEYS}
+        if self._addressing is Addressing.PKW:
+            address = Address(_int(table, "ind"), _int(table, "pnu"), Addressing.PKW)
+            yield self._row(address, inherited, table, kind, line)
+            return
+        index = _int(table, "index")
+        if kind is Kind.VAR:
+            yield self._row(Address(index), inherited, table, kind, line)
+            return
+        subs = list(_subs(table))
+        lines = self._lines.subs("object", number, len(table.get("subs", ())))
+        if not any(sub["sub"] == 0 for sub, _ in subs):
+            subs.insert(0, ({"sub": 0}, None))
+        highest = max(sub["sub"] for sub, _ in subs)
+        for sub, position in subs:
+            sub_line = lines[position] if position is not None else line
+            for key in sub.keys() - _ROW_KEYS - {"sub"}:
+                self._say(sub_line, f"unknown key '{key}'")
+            row = _sub_zero(inherited, sub, highest) if sub["sub"] == 0 else inherited | sub
+            try:
+                yield self._row(Address(index, sub["sub"]), row, table, kind, sub_line)
+            except (_WrongError, UsageError, KeyError, TypeError, ValueError) as error:
+                self._say(sub_line, f"{index:04X}:{sub['sub']:02X}: {_reason(error)}")
+
+    def _row(self, address: Address, row: Mapping[str, Any], table: Mapping[str, Any], kind: Kind, line: int) -> Entry:
+        data_type = _enum(DataType, row.get("type"), "type", by_name=True)
+        default = row.get("default")
+        if default is not None:
+            default = _raw(default)
+            try:
+                encode_raw(data_type, default)
+            except ValueError as error:
+                raise _WrongError(f"default {default!r} does not fit {data_type.name}: {error}") from error
+        note = row.get("note")
+        timeout = row.get("timeout_s")
+        return Entry(
+            address=address,
+            name=_text(row, "name"),
+            object_name=_text(table, "name"),
+            kind=kind,
+            type=data_type,
+            access=_enum(Access, row.get("access"), "access"),
+            pdo=_bool(row, "pdo"),
+            default=default,
+            saved=_bool(row, "saved"),
+            group=_text(row, "group"),
+            section=_text(row, "section"),
+            quantity=_quantity(row),
+            quantity_rule=_quantity_rule(row.get("unit_from")),
+            minimum=_limit(row.get("min")),
+            maximum=_limit(row.get("max")),
+            enumeration=row.get("enumeration"),
+            bits=row.get("bits"),
+            restore=_enum(RestoreClass, row.get("restore", "never"), "restore"),
+            verify=_enum(Verify, row.get("verify", "equal"), "verify"),
+            save_category=row.get("save_category"),
+            requires=tuple(
+                Condition(parse_address(one["address"]), tuple(one["values"])) for one in row.get("requires", ())
+            ),
+            mirror=_mirror(row.get("mirror")),
+            variants={name: _variant(values) for name, values in row.get("by_variant", {}).items()},
+            note=f"note.{self._data['id']}.{note}" if note else None,
+            inferred=_bool(row, "inferred"),
+            timeout_s=None if timeout is None else float(timeout),
+            hexadecimal=_bool(row, "hex"),
+            node_id=_bool(row, "node_id"),
+            line=line,
+        )
+
+    def _cross_check(self, description: Description) -> None:
+        for entry in description:
+            for reason in _contradictions(description, entry):
+                self._say(entry.line, f"{entry.address.short}: {reason}")
+        for number, command in enumerate(description.save):
+            if command.address not in description.entries:
+                self._say(self._lines.table("save", number), f"save address {command.address} is no object")
+
+
+def _contradictions(description: Description, entry: Entry) -> Iterator[str]:
+    """What in one entry does not agree with the rest of the description."""
+    if entry.bits is not None and entry.bits not in description.bit_tables:
+        yield f"bit table '{entry.bits}' does not exist"
+    if entry.enumeration is not None and entry.enumeration not in description.enumerations:
+        yield f"enumeration '{entry.enumeration}' does not exist"
+    if entry.group not in description.groups:
+        yield f"group '{entry.group}' does not exist"
+    if unknown := entry.variants.keys() - set(description.variants):
+        yield f"variant '{min(unknown)}' does not exist"
+    for what, address in _references(entry):
+        if address not in description.entries:
+            yield f"{what} refers to {address.short}, which is no object here"
+    if entry.access is not Access.RW and entry.access is not Access.WO and entry.restore in (RestoreClass.COPY,):
+        yield f"restore class '{entry.restore.value}' on an object that cannot be written ({entry.access.value})"
+    low, high = entry.minimum, entry.maximum
+    if isinstance(entry.default, int) and not entry.inferred:
+        if isinstance(low, int) and entry.default < low:
+            yield f"default {entry.default} is below the minimum {low}"
+        if isinstance(high, int) and entry.default > high:
+            yield f"default {entry.default} is above the maximum {high}"
+    if isinstance(low, int) and isinstance(high, int) and low > high:
+        yield f"minimum {low} is above the maximum {high}"
+
+
+def _references(entry: Entry) -> Iterator[tuple[str, Address]]:
+    if entry.quantity_rule is not None:
+        yield "unit_from", entry.quantity_rule.address
+        if entry.quantity_rule.shaft is not None:
+            yield "unit_from shaft", entry.quantity_rule.shaft
+    for what, limit in (("min", entry.minimum), ("max", entry.maximum)):
+        if isinstance(limit, LimitRef):
+            yield what, limit.address
+    for condition in entry.requires:
+        yield "requires", condition.address
+    if entry.mirror is not None:
+        yield "mirror", entry.mirror.of
+
+
+def _subs(table: Mapping[str, Any]) -> Iterator[tuple[dict[str, Any], int | None]]:
+    """The subs of an object with the position of their line in ``subs`` (None for ``elements``)."""
+    elements = table.get("elements")
+    if elements is not None:
+        own = {key: value for key, value in elements.items() if key not in ("count", "first", "name")}
+        first = int(elements.get("first", 1))
+        for number in range(int(elements["count"])):
+            yield own | {"sub": first + number, "name": elements["name"].replace("{n}", str(number + 1))}, None
+    for position, sub in enumerate(table.get("subs", ())):
+        if not isinstance(sub.get("sub"), int) or not 0 <= sub["sub"] <= 255:
+            raise _WrongError(f"sub {sub.get('sub')!r} is no sub-index")
+        yield dict(sub), position
+    if elements is None and not table.get("subs"):
+        raise _WrongError("an array or record needs subs or elements")
+
+
+def _sub_zero(inherited: Mapping[str, Any], own: Mapping[str, Any], highest: int) -> dict[str, Any]:
+    """Sub-index 0: the number of elements (CiA 301, 7.4.3); single keys of it may be overridden."""
+    kept = {key: value for key, value in inherited.items() if key not in _NOT_INHERITED_BY_SUB0}
+    implied = {"name": "number of elements", "type": "unsigned8", "access": "ro", "default": highest}
+    return kept | implied | dict(own)
+
+
+def _bit_table(table: Mapping[str, Any]) -> BitTable:
+    name = _text(table, "id")
+    bits = tuple(
+        Bit(
+            bit=_int(row, "bit"),
+            name=_text(row, "name"),
+            text_key=f"bit.{name}.{row['name']}",
+            last=row.get("last"),
+            clamp=row.get("clamp", ""),
+            error_code=row.get("error"),
+        )
+        for row in table["bits"]
+    )
+    covered = 0
+    for bit in bits:
+        if covered & bit.mask:
+            raise _WrongError(f"bit {bit.bit} of table '{name}' stands twice")
+        covered |= bit.mask
+    return BitTable(name, bits)
+
+
+def _enumeration(table: Mapping[str, Any]) -> Enumeration:
+    name = _text(table, "id")
+    values = tuple(
+        EnumValue(_int(row, "value"), _text(row, "name"), f"enum.{name}.{row['name']}") for row in table["values"]
+    )
+    numbers = [value.value for value in values]
+    if len(set(numbers)) != len(numbers):
+        raise _WrongError(f"a value of enumeration '{name}' stands twice")
+    return Enumeration(name, values, bool(table.get("exclusive", True)))
+
+
+def _error_code(table: Mapping[str, Any]) -> ErrorCode:
+    name = _text(table, "name")
+    return ErrorCode(_int(table, "code"), name, f"error_code.{name}", str(table.get("reaction", "")))
+
+
+def _save_command(table: Mapping[str, Any]) -> SaveCommand:
+    return SaveCommand(
+        parse_address(_text(table, "address")),
+        _int(table, "signature"),
+        table.get("category"),
+        float(table.get("timeout_s", 10.0)),
+    )
+
+
+def _quantity(row: Mapping[str, Any]) -> Quantity:
+    return Quantity(str(row.get("unit", "")), Decimal(str(row.get("scale", 1))))
+
+
+def _quantity_rule(row: Mapping[str, Any] | None) -> QuantityRule | None:
+    if row is None:
+        return None
+    choices = {int(value): _quantity(choice) for value, choice in row.get("choices", {}).items()}
+    shaft = row.get("shaft")
+    return QuantityRule(parse_address(row["address"]), choices, None if shaft is None else parse_address(shaft))
+
+
+def _limit(value: Any) -> Limit | None:
+    if isinstance(value, Mapping):
+        return LimitRef(parse_address(value["address"]), Decimal(str(value.get("factor", 1))))
+    if value is None or (isinstance(value, int | Decimal) and not isinstance(value, bool)):
+        return value
+    raise _WrongError(f"limit {value!r} is neither a number nor a reference")
+
+
+def _mirror(row: Mapping[str, Any] | None) -> Mirror | None:
+    return None if row is None else Mirror(parse_address(row["of"]), int(row.get("divisor", 1)))
+
+
+def _variant(row: Mapping[str, Any]) -> VariantValues:
+    default = row.get("default")
+    return VariantValues(None if default is None else _raw(default), _limit(row.get("min")), _limit(row.get("max")))
+
+
+def _raw(value: Any) -> Raw:
+    if isinstance(value, Decimal):
+        return float(value)
+    if isinstance(value, int | str) and not isinstance(value, bool):
+        return value
+    raise _WrongError(f"{value!r} is no raw value")
+
+
+def _enum(kind: type[_E], value: Any, key: str, by_name: bool = False) -> _E:
+    try:
+        return kind[str(value).upper()] if by_name else kind(value)
+    except (KeyError, ValueError):
+        allowed: Sequence[str] = [m.name.lower() if by_name else str(m.value) for m in kind]
+        raise _WrongError(f"{key} is {value!r}, not one of: {', '.join(allowed)}") from None
+
+
+def _text(row: Mapping[str, Any], key: str) -> str:
+    value = row.get(key)
+    if not isinstance(value, str) or not value:
+        raise _WrongError(f"key '{key}' is missing or no text")
+    return value
+
+
+def _int(row: Mapping[str, Any], key: str) -> int:
+    value = row.get(key)
+    if not isinstance(value, int) or isinstance(value, bool):
+        raise _WrongError(f"key '{key}' is missing or no integer")
+    return value
+
+
+def _bool(row: Mapping[str, Any], key: str) -> bool:
+    value = row.get(key, False)
+    if not isinstance(value, bool):
+        raise _WrongError(f"key '{key}' is {value!r}, neither true nor false")
+    return value
+
+
+def _reason(error: Exception) -> str:
+    if isinstance(error, KeyError):
+        return f"key {error} is missing"
+    if isinstance(error, UsageError):
+        return str(error.details.get("reason", error))
+    return str(error)

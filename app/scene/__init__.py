@@ -1,0 +1,1 @@
+"""The live state as a 3D scene."""

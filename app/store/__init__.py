@@ -1,0 +1,1 @@
+"""What is kept: parameter sets, motors, incidents, users, audit."""

@@ -1,0 +1,1 @@
+"""Devices that answer: plant physics, device behaviour, one mount a bus."""

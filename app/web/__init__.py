@@ -1,0 +1,1 @@
+"""The page's server: routes, socket, guards. No logic."""
