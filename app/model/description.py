@@ -193,7 +193,8 @@ class Entry:
     """One row of a dictionary: one sub-index, or one PNU.
 
     ``default``, ``minimum`` and ``maximum`` are raw values; where ``node_id``, the node's number is added to the
-    default ($NODEID of CiA 306). ``inferred`` marks what the manual does not print. ``line`` is the row's line in its file.
+    default ($NODEID of CiA 306). ``inferred`` marks what the manual does not print.
+    ``line`` is the row's line in its file.
     """
 
     address: Address

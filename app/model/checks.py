@@ -1,0 +1,116 @@
+"""What may be written: access, type, limits and preconditions, decided before anything is sent."""
+
+from __future__ import annotations
+
+from decimal import Decimal
+
+from app.errors import AccessError, LimitError, PreconditionError, ValueTypeError
+from app.model.datatypes import Raw, encode_raw
+from app.model.description import Access, Description, Entry, Limit, LimitRef, Lookup
+from app.model.values import quantity_of, show
+
+
+def check_read(entry: Entry) -> None:
+    """Raises AccessError where the object cannot be read."""
+    if not entry.access.readable:
+        raise AccessError(address=entry.address.short, name=entry.title, access=entry.access.value)
+
+
+def check_write(
+    description: Description,
+    entry: Entry,
+    raw: Raw,
+    lookup: Lookup,
+    *,
+    factory: bool = False,
+    variant: str | None = None,
+) -> bytes:
+    """Check everything that can be known before a write; gives the bytes to send.
+
+    ``lookup`` knows other objects of the device; a limit that rests on an unknown object is left to the device.
+    ``factory`` allows r(w) objects. Raises AccessError, ValueTypeError, LimitError or PreconditionError.
+    """
+    if not (entry.access.writable or (factory and entry.access is Access.FACTORY)):
+        raise AccessError(address=entry.address.short, name=entry.title, access=entry.access.value)
+    data = _encode(entry, raw)
+    if isinstance(raw, int | float):
+        _check_limits(entry, raw, lookup, variant)
+        _check_enumeration(description, entry, raw)
+    for condition in entry.requires:
+        found = lookup(condition.address)
+        if found is not None and found not in condition.values:
+            raise PreconditionError(
+                address=entry.address.short,
+                name=entry.title,
+                needs=f"{condition.address.short} = {' or '.join(map(str, condition.values))}",
+                found=str(found),
+            )
+    return data
+
+
+def limits_of(entry: Entry, lookup: Lookup, variant: str | None = None) -> tuple[Decimal | None, Decimal | None]:
+    """Raw limits in force, those of the data type included; None where there is none or it is not known."""
+    own = entry.variants.get(variant) if variant is not None else None
+    low = _resolve(own.minimum if own and own.minimum is not None else entry.minimum, lookup)
+    high = _resolve(own.maximum if own and own.maximum is not None else entry.maximum, lookup)
+    span = entry.type.range
+    if span is not None:
+        low = Decimal(span[0]) if low is None else max(low, Decimal(span[0]))
+        high = Decimal(span[1]) if high is None else min(high, Decimal(span[1]))
+    return low, high
+
+
+def _resolve(limit: Limit | None, lookup: Lookup) -> Decimal | None:
+    if isinstance(limit, LimitRef):
+        found = lookup(limit.address)
+        return Decimal(str(found)) * limit.factor if isinstance(found, int | float) else None
+    return None if limit is None else Decimal(limit)
+
+
+def _encode(entry: Entry, raw: Raw) -> bytes:
+    span = entry.type.range
+    if span is not None and isinstance(raw, int) and not isinstance(raw, bool) and not span[0] <= raw <= span[1]:
+        raise _limit_error(entry, raw, Decimal(span[0]), Decimal(span[1]), lambda _address: None)
+    try:
+        return encode_raw(entry.type, raw)
+    except ValueError as error:
+        raise ValueTypeError(
+            address=entry.address.short, name=entry.title, type=entry.type.name, value=str(raw), reason=str(error)
+        ) from error
+
+
+def _check_limits(entry: Entry, raw: int | float, lookup: Lookup, variant: str | None) -> None:
+    low, high = limits_of(entry, lookup, variant)
+    number = Decimal(str(raw))
+    if (low is not None and number < low) or (high is not None and number > high):
+        raise _limit_error(entry, raw, low, high, lookup)
+
+
+def _limit_error(
+    entry: Entry, raw: int | float, low: Decimal | None, high: Decimal | None, lookup: Lookup
+) -> LimitError:
+    def shown(number: Decimal | None) -> str:
+        return "–" if number is None else show(entry, int(number) if entry.type.is_integer else float(number), lookup)
+
+    return LimitError(
+        address=entry.address.short,
+        name=entry.title,
+        value=show(entry, raw, lookup),
+        minimum=shown(low),
+        maximum=shown(high),
+        unit=quantity_of(entry, lookup).unit,
+    )
+
+
+def _check_enumeration(description: Description, entry: Entry, raw: int | float) -> None:
+    if entry.enumeration is None:
+        return
+    enumeration = description.enumerations[entry.enumeration]
+    if enumeration.exclusive and all(value.value != raw for value in enumeration.values):
+        raise ValueTypeError(
+            address=entry.address.short,
+            name=entry.title,
+            type=entry.type.name,
+            value=str(raw),
+            reason="not one of: " + ", ".join(f"{value.value} {value.name}" for value in enumeration.values),
+        )

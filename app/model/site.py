@@ -1,0 +1,157 @@
+"""The site file: turbines, their stations and devices, and where each is found on a bus (TOML, schema 1)."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from app.errors import SiteError
+
+SCHEMA: Final = 1
+_SLUG: Final = re.compile(r"^[a-z0-9]+(-[a-z0-9]+)*$")
+
+
+@dataclass(frozen=True, slots=True)
+class BusConfig:
+    """One bus of a turbine: its name in recordings, the adapter (``socketcand:127.0.0.1:29536``) and the bit rate."""
+
+    name: str
+    connection: str
+    bitrate: int
+
+
+@dataclass(frozen=True, slots=True)
+class Device:
+    """One device of a station. ``slug`` is the whole path, as used in addresses, sets and audit."""
+
+    slug: str
+    name: str
+    description_id: str
+    bus: str
+    node: int
+
+
+@dataclass(frozen=True, slots=True)
+class Station:
+    """A blade (``blade`` 1..3), or a bench (``blade`` None)."""
+
+    slug: str
+    name: str
+    blade: int | None
+    devices: tuple[Device, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Turbine:
+    """A turbine with its buses and stations."""
+
+    slug: str
+    name: str
+    buses: tuple[BusConfig, ...]
+    stations: tuple[Station, ...]
+
+    @property
+    def devices(self) -> tuple[Device, ...]:
+        """All devices, station by station."""
+        return tuple(device for station in self.stations for device in station.devices)
+
+    def device(self, target: str) -> Device | None:
+        """The device with this slug, with or without the turbine in front, or with this node number."""
+        for device in self.devices:
+            if target in (device.slug, device.slug.split("/", 1)[1], str(device.node)):
+                return device
+        return None
+
+
+def load_site(path: Path) -> tuple[Turbine, ...]:
+    """Read a site file. Raises SiteError with file, key and reason."""
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise SiteError(file=str(path), key="", reason=f"cannot be read: {error}") from error
+    except tomllib.TOMLDecodeError as error:
+        raise SiteError(file=str(path), key="", reason=f"no valid TOML: {error}") from error
+    return _Reader(str(path)).turbines(data)
+
+
+class _Reader:
+    def __init__(self, file: str) -> None:
+        self._file = file
+
+    def _wrong(self, key: str, reason: str) -> SiteError:
+        return SiteError(file=self._file, key=key, reason=reason)
+
+    def turbines(self, data: Mapping[str, Any]) -> tuple[Turbine, ...]:
+        if data.get("schema") != SCHEMA:
+            raise self._wrong("schema", f"is {data.get('schema')!r}, this version reads {SCHEMA}")
+        found = tuple(self._turbine(slug, table) for slug, table in self._tables(data, "turbine", ""))
+        if not found:
+            raise self._wrong("turbine", "no turbine is named")
+        return found
+
+    def _tables(self, table: Mapping[str, Any], key: str, where: str) -> Iterator[tuple[str, Mapping[str, Any]]]:
+        children = table.get(key, {})
+        if not isinstance(children, Mapping):
+            raise self._wrong(f"{where}{key}", "is no table of slugs")
+        for slug, child in children.items():
+            if not _SLUG.match(slug):
+                raise self._wrong(f"{where}{key}.{slug}", "a slug has small letters, digits and single hyphens")
+            if not isinstance(child, Mapping):
+                raise self._wrong(f"{where}{key}.{slug}", "is no table")
+            yield slug, child
+
+    def _turbine(self, slug: str, table: Mapping[str, Any]) -> Turbine:
+        where = f"turbine.{slug}."
+        buses = tuple(
+            BusConfig(
+                name, self._text(bus, "connection", f"{where}bus.{name}."), self._int(bus, "bitrate", where, 500_000)
+            )
+            for name, bus in self._tables(table, "bus", where)
+        )
+        stations = tuple(
+            self._station(slug, name, station, buses) for name, station in self._tables(table, "station", where)
+        )
+        turbine = Turbine(slug, str(table.get("name", slug.upper())), buses, stations)
+        seen: dict[tuple[str, int], str] = {}
+        for device in turbine.devices:
+            other = seen.setdefault((device.bus, device.node), device.slug)
+            if other != device.slug:
+                raise self._wrong(f"{device.slug}.node", f"node {device.node} is already {other}")
+        return turbine
+
+    def _station(self, turbine: str, slug: str, table: Mapping[str, Any], buses: tuple[BusConfig, ...]) -> Station:
+        where = f"turbine.{turbine}.station.{slug}."
+        devices = tuple(
+            self._device(f"{turbine}/{slug}/{name}", device, f"{where}device.{name}.", buses)
+            for name, device in self._tables(table, "device", where)
+        )
+        blade = table.get("blade")
+        if blade is not None and (not isinstance(blade, int) or not 1 <= blade <= 3):
+            raise self._wrong(f"{where}blade", f"is {blade!r}, not 1, 2 or 3")
+        return Station(f"{turbine}/{slug}", str(table.get("name", slug.replace("-", " "))), blade, devices)
+
+    def _device(self, slug: str, table: Mapping[str, Any], where: str, buses: tuple[BusConfig, ...]) -> Device:
+        node = self._int(table, "node", where, None)
+        if not 1 <= node <= 127:
+            raise self._wrong(f"{where}node", f"is {node}, not 1 to 127")
+        bus = str(table.get("bus", buses[0].name if buses else ""))
+        if bus not in {one.name for one in buses}:
+            raise self._wrong(f"{where}bus", f"bus '{bus}' is not named in this turbine")
+        name = str(table.get("name", slug.rsplit("/", 1)[1].upper()))
+        return Device(slug, name, self._text(table, "description", where), bus, node)
+
+    def _text(self, table: Mapping[str, Any], key: str, where: str) -> str:
+        value = table.get(key)
+        if not isinstance(value, str) or not value:
+            raise self._wrong(f"{where}{key}", "is missing or no text")
+        return value
+
+    def _int(self, table: Mapping[str, Any], key: str, where: str, default: int | None) -> int:
+        value = table.get(key, default)
+        if not isinstance(value, int) or isinstance(value, bool):
+            raise self._wrong(f"{where}{key}", "is missing or no integer")
+        return value
