@@ -191,3 +191,140 @@ def download_segment_response(toggle: bool) -> bytes:
 def crc(data: bytes, value: int = 0) -> int:
     """CRC of block transfers: CCITT polynomial 1021h, start 0 (7.2.4.3.16)."""
     return binascii.crc_hqx(data, value)
+
+
+MAX_BLOCK_SIZE: Final = 127
+SEGMENT_SIZE: Final = 7
+
+
+class BlockStep(IntEnum):
+    """Sub-command of block frames, bits 1..0 of the first byte. Sub-block segments have none."""
+
+    INITIATE = 0
+    END = 1
+    ACKNOWLEDGE = 2
+    START = 3
+
+
+class BlockInitiate(NamedTuple):
+    """Initiate frame of the side that sends the data; ``size`` in bytes is None where it is not announced."""
+
+    address: Address
+    crc: bool
+    size: int | None
+
+
+class BlockAccept(NamedTuple):
+    """Initiate frame of the side that receives the data: segments a block; ``pst`` only from a client (upload).
+
+    ``pst`` is the protocol switch threshold in bytes: up to it a server may answer with a plain upload; 0 forbids it.
+    """
+
+    address: Address
+    crc: bool
+    block_size: int
+    pst: int = 0
+
+
+class BlockSegment(NamedTuple):
+    """A segment of a sub-block: ``sequence`` 1..127, always 7 bytes; the unused ones are told by the end frame."""
+
+    sequence: int
+    last: bool
+    data: bytes
+
+
+class BlockAcknowledge(NamedTuple):
+    """Last segment received in order (0: none), and segments a block from now on."""
+
+    sequence: int
+    block_size: int
+
+
+class BlockEnd(NamedTuple):
+    """Bytes of the last segment that are no data, and the CRC over all data (0 where not agreed)."""
+
+    unused: int
+    crc: int
+
+
+def block_step(data: bytes) -> BlockStep:
+    """Sub-command of a block frame that is no segment."""
+    return BlockStep(data[0] & 3)
+
+
+def block_download_request(address: Address, size: int | None, crc: bool = True) -> bytes:
+    """Client: initiate a block download (write)."""
+    return _IDX_U32.pack(0xC0 | crc << 2 | (size is not None) << 1, address.major, address.minor, size or 0)
+
+
+def block_download_response(address: Address, block_size: int, crc: bool = True) -> bytes:
+    """Server: accept a block download."""
+    return _IDX.pack(0xA0 | crc << 2, address.major, address.minor, bytes((block_size, 0, 0, 0)))
+
+
+def block_upload_request(address: Address, block_size: int, pst: int = 0, crc: bool = True) -> bytes:
+    """Client: initiate a block upload (read)."""
+    return _IDX.pack(0xA0 | crc << 2, address.major, address.minor, bytes((block_size, pst, 0, 0)))
+
+
+def block_upload_response(address: Address, size: int | None, crc: bool = True) -> bytes:
+    """Server: accept a block upload."""
+    return _IDX_U32.pack(0xC0 | crc << 2 | (size is not None) << 1, address.major, address.minor, size or 0)
+
+
+def block_upload_start() -> bytes:
+    """Client: let the server send the first sub-block."""
+    return b"\xa3" + bytes(7)
+
+
+def block_segment(sequence: int, data: bytes, last: bool) -> bytes:
+    """One segment of up to 7 bytes, from client (download) or server (upload).
+
+    Raises ValueError where the sequence number is not 1..127.
+    """
+    if not 1 <= sequence <= MAX_BLOCK_SIZE:
+        raise ValueError(f"sequence number {sequence} is outside 1..127")
+    return bytes((last << 7 | sequence,)) + data.ljust(SEGMENT_SIZE, b"\0")
+
+
+def block_acknowledge(sequence: int, block_size: int) -> bytes:
+    """Acknowledge a sub-block, from server (download) or client (upload): the same bytes."""
+    return bytes((0xA2, sequence, block_size)) + bytes(5)
+
+
+def block_end(unused: int, crc: int) -> bytes:
+    """End of the data, from client (download) or server (upload): the same bytes."""
+    return bytes((0xC1 | unused << 2, crc & 0xFF, crc >> 8)) + bytes(5)
+
+
+def block_end_response() -> bytes:
+    """Confirm the end, from server (download) or client (upload): the same bytes."""
+    return b"\xa1" + bytes(7)
+
+
+def parse_block_initiate(data: bytes) -> BlockInitiate:
+    """Read ``block_download_request`` or ``block_upload_response``."""
+    head, index, sub, size = _IDX_U32.unpack(data)
+    return BlockInitiate(Address(index, sub), bool(head & 4), size if head & 2 else None)
+
+
+def parse_block_accept(data: bytes) -> BlockAccept:
+    """Read ``block_download_response`` or ``block_upload_request``."""
+    head, index, sub, rest = _IDX.unpack(data)
+    return BlockAccept(Address(index, sub), bool(head & 4), rest[0], rest[1])
+
+
+def parse_block_segment(data: bytes) -> BlockSegment:
+    """Read a segment of a sub-block."""
+    return BlockSegment(data[0] & 0x7F, bool(data[0] & 0x80), data[1:])
+
+
+def parse_block_acknowledge(data: bytes) -> BlockAcknowledge:
+    """Read the acknowledge of a sub-block."""
+    return BlockAcknowledge(data[1], data[2])
+
+
+def parse_block_end(data: bytes) -> BlockEnd:
+    """Read the end of the data."""
+    return BlockEnd(data[0] >> 2 & 7, data[1] | data[2] << 8)
