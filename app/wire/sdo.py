@@ -198,7 +198,7 @@ SEGMENT_SIZE: Final = 7
 
 
 class BlockStep(IntEnum):
-    """Sub-command of block frames, bits 1..0 of the first byte. Sub-block segments have none."""
+    """Sub-command of block frames, the lowest bits of the first byte. Sub-block segments have none."""
 
     INITIATE = 0
     END = 1
@@ -249,8 +249,8 @@ class BlockEnd(NamedTuple):
 
 
 def block_step(data: bytes) -> BlockStep:
-    """Sub-command of a block frame that is no segment."""
-    return BlockStep(data[0] & 3)
+    """Sub-command of a block frame that is no segment: one bit from the sender of the data, two from its receiver."""
+    return BlockStep(data[0] & (1 if data[0] >> 5 == Command.CCS_BLOCK_DOWNLOAD else 3))
 
 
 def block_download_request(address: Address, size: int | None, crc: bool = True) -> bytes:
