@@ -1,0 +1,73 @@
+# make run    the demo: twins, server and page      make test   everything that must pass
+# make check  the fast loop (format, lint, types, layers, generated files)
+# make bench  all benchmarks                        make soak   the long figures
+PYTHON ?= python3
+VENV   ?= .venv
+BIN    := $(VENV)/bin
+PY     := $(BIN)/python
+ROOT   := $(if $(filter 0,$(shell id -u)),,sudo)
+
+.PHONY: run test check bench soak setup system page lock generate clean
+
+run: $(VENV)/.ready frontend/dist/index.html
+	$(BIN)/hubside demo
+
+test: setup check
+	$(PY) -m pytest -m "not soak"
+	cd frontend && npm test
+
+check: $(VENV)/.ready frontend/node_modules/.ready
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(PY) -m pytest tests/test_layers.py tests/test_generated.py
+	cd frontend && npm run --silent check
+
+bench: setup
+	$(PY) -m bench all
+
+soak: setup
+	$(PY) -m pytest -m soak --timeout 7200
+
+setup: system $(VENV)/.ready frontend/dist/index.html
+
+# The browser of the end-to-end tests and the tracer of the recorder's test come from the system.
+system:
+	@missing=""; \
+	command -v chromium >/dev/null || missing="$$missing chromium fonts-dejavu-core"; \
+	command -v strace >/dev/null || missing="$$missing strace"; \
+	if [ -n "$$missing" ]; then \
+	  $(ROOT) apt-get update -qq && DEBIAN_FRONTEND=noninteractive $(ROOT) apt-get install -y -qq $$missing >/dev/null; \
+	fi
+
+$(VENV)/.ready: requirements/dev.txt pyproject.toml
+	$(PYTHON) -m venv $(VENV)
+	$(PY) -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements/dev.txt
+	$(PY) -m pip install --quiet --disable-pip-version-check --no-build-isolation --no-deps -e .
+	@touch $@
+
+frontend/node_modules/.ready: frontend/package-lock.json
+	cd frontend && npm ci --no-audit --no-fund --loglevel=error
+	@touch $@
+
+PAGE := $(shell find frontend/src frontend/public -type f 2>/dev/null) frontend/index.html frontend/vite.config.ts
+frontend/dist/index.html: frontend/node_modules/.ready $(PAGE)
+	cd frontend && npm run --silent build
+
+page: frontend/dist/index.html
+
+# Everything that is generated from something else; `make check` fails where it is out of date.
+generate: $(VENV)/.ready frontend/node_modules/.ready
+	$(PY) -m app.web.generate frontend/openapi.json
+	cd frontend && npm run --silent generate
+	$(BIN)/hubside od export --all-eds od/eds
+
+# Lock files hold versions and hashes and no registry host.
+lock:
+	$(BIN)/pip-compile --quiet --strip-extras --generate-hashes --no-emit-index-url --no-emit-find-links \
+	  --no-emit-trusted-host --allow-unsafe --extra dev --output-file requirements/dev.txt pyproject.toml
+	$(BIN)/pip-compile --quiet --strip-extras --generate-hashes --no-emit-index-url --no-emit-find-links \
+	  --no-emit-trusted-host --allow-unsafe --output-file requirements/run.txt pyproject.toml
+
+clean:
+	rm -rf $(VENV) frontend/node_modules frontend/dist
