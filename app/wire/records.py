@@ -1,0 +1,236 @@
+"""What the passive decoder says about frames: one small record a fact, each with time, bus and node.
+
+``t_ns`` is that of the frame which made the fact known; node 0 means all nodes, or none in particular.
+"""
+
+from __future__ import annotations
+
+from enum import Enum
+from typing import NamedTuple
+
+from app.model.address import Address
+from app.wire.frame import Direction
+from app.wire.nmt import NmtCommand, NmtState
+
+
+class Source(Enum):
+    """How a value came to be known."""
+
+    SDO_READ = "sdo_read"
+    SDO_WRITE = "sdo_write"
+    """Written by an acknowledged download; the device may hold something else."""
+    PDO_TX = "pdo_tx"
+    """Sent by the device."""
+    PDO_RX = "pdo_rx"
+    """Sent to the device by somebody; never acknowledged."""
+    EMCY = "emcy"
+
+
+class SdoAccess(Enum):
+    """What an SDO client did."""
+
+    READ = "read"
+    WRITE = "write"
+
+
+class Protocol(Enum):
+    """The SDO protocol used (CiA 301, 7.2.4.2)."""
+
+    EXPEDITED = "expedited"
+    SEGMENTED = "segmented"
+    BLOCK = "block"
+
+
+class Outcome(Enum):
+    """How an SDO transfer ended.
+
+    LOST: nobody ended it, a new transfer, a boot-up or a gap did: what a write did to the device is unknown.
+    BROKEN: it was ended properly, but what was seen of it makes no whole.
+    """
+
+    DONE = "done"
+    ABORTED = "aborted"
+    LOST = "lost"
+    BROKEN = "broken"
+
+
+class Side(Enum):
+    """Who aborted a transfer."""
+
+    CLIENT = "client"
+    SERVER = "server"
+
+
+class Fault(Enum):
+    """Why a frame makes no sense."""
+
+    LENGTH = "length"
+    """The data field has a length that its protocol does not know."""
+    COMMAND = "command"
+    """An unknown SDO or NMT command."""
+    STATE = "state"
+    """An unknown NMT state in a heartbeat."""
+    TOGGLE = "toggle"
+    """The toggle bit of a segment did not alternate."""
+    SIZE = "size"
+    """A transfer gave another number of bytes than it announced, or too many to follow."""
+    SEQUENCE = "sequence"
+    """Segments of a block are missing which the receiver acknowledged."""
+    CRC = "crc"
+    """The CRC of a block transfer does not fit its data."""
+    PDO_LENGTH = "pdo_length"
+    """A PDO is shorter than its mapping."""
+
+    @property
+    def text_key(self) -> str:
+        """Text key of the explanation."""
+        return f"fault.{self.value}"
+
+
+class ValueSeen(NamedTuple):
+    """The bytes of an object, least significant first, as an SDO or a PDO carried them."""
+
+    t_ns: int
+    bus: str
+    node: int
+    address: Address
+    data: bytes
+    source: Source
+
+
+class SdoSeen(NamedTuple):
+    """A finished SDO transfer. ``data`` is None unless DONE; of an unfinished write nothing is claimed.
+
+    ``dt_ns`` runs from the first request to the end. ``client`` is TX where the transfer was ours. ``aborted_by`` is
+    None unless ABORTED.
+    """
+
+    t_ns: int
+    bus: str
+    node: int
+    access: SdoAccess
+    address: Address
+    outcome: Outcome
+    data: bytes | None
+    abort_code: int | None
+    aborted_by: Side | None
+    protocol: Protocol
+    dt_ns: int
+    client: Direction
+
+
+class OrphanSeen(NamedTuple):
+    """An SDO answer, segment or abort that belongs to no open transfer: most often a late one.
+
+    ``address`` is None where the frame carries none.
+    """
+
+    t_ns: int
+    bus: str
+    node: int
+    address: Address | None
+    side: Side
+    data: bytes
+
+
+class SaveSeen(NamedTuple):
+    """'save' was written to 1010h; ``done`` tells whether it was acknowledged. The sub-index is the category."""
+
+    t_ns: int
+    bus: str
+    node: int
+    address: Address
+    done: bool
+
+
+class LoadSeen(NamedTuple):
+    """'load' (restore default parameters) was written to 1011h; ``done`` tells whether it was acknowledged."""
+
+    t_ns: int
+    bus: str
+    node: int
+    address: Address
+    done: bool
+
+
+class NmtCommandSeen(NamedTuple):
+    """An NMT command; node 0 addresses all."""
+
+    t_ns: int
+    bus: str
+    node: int
+    command: NmtCommand
+    client: Direction
+
+
+class StateSeen(NamedTuple):
+    """A heartbeat, or an answer to node guarding."""
+
+    t_ns: int
+    bus: str
+    node: int
+    state: NmtState
+
+
+class BootUpSeen(NamedTuple):
+    """The boot-up message: the node has started anew and is pre-operational."""
+
+    t_ns: int
+    bus: str
+    node: int
+
+
+class EmcySeen(NamedTuple):
+    """An emergency message: code, error register and 5 bytes of the maker."""
+
+    t_ns: int
+    bus: str
+    node: int
+    code: int
+    register: int
+    data: bytes
+
+
+class SyncSeen(NamedTuple):
+    """A SYNC; ``counter`` is None where it carries none. ``node`` is 0."""
+
+    t_ns: int
+    bus: str
+    node: int
+    counter: int | None
+
+
+class GapSeen(NamedTuple):
+    """Frames are missing before ``t_ns``; ``reason`` is a text key. ``node`` is 0."""
+
+    t_ns: int
+    bus: str
+    node: int
+    reason: str
+
+
+class MalformedSeen(NamedTuple):
+    """A frame, or what it completed, makes no sense. ``node`` is 0 where it names none."""
+
+    t_ns: int
+    bus: str
+    node: int
+    can_id: int
+    fault: Fault
+    data: bytes
+
+
+Record = (
+    ValueSeen
+    | SdoSeen
+    | OrphanSeen
+    | SaveSeen
+    | LoadSeen
+    | NmtCommandSeen
+    | StateSeen
+    | BootUpSeen
+    | EmcySeen
+    | SyncSeen
+    | GapSeen
+    | MalformedSeen
+)
