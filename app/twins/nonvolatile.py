@@ -1,0 +1,147 @@
+"""Saving and restoring parameters: 1010h and 1011h (CiA 301, 7.5.2.13 and 7.5.2.14).
+
+"Save" copies the RAM values into the memory and its file; "load" empties the memory, so that defaults are in force
+after the next restart.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Final
+
+from app.model.address import Address
+from app.model.datatypes import Raw, encode_raw
+from app.model.description import LOAD_SIGNATURE, SAVE_SIGNATURE, Access, Entry
+from app.twins.object_store import Cell, Deferred, Effect, Guard, ObjectStore, RefusedAccessError
+from app.twins.state_file import Memory, StateFile
+from app.wire.sdo import Abort
+
+_SAVE_INDEX: Final = 0x1010
+_LOAD_INDEX: Final = 0x1011
+_ON_COMMAND: Final = 1
+"""What 1010h and 1011h answer when read: bit 0, the device saves (restores) on command."""
+
+
+class NonVolatile:
+    """The memory of one device and the objects that command it.
+
+    ``delivered`` is what the memory holds when there is no file yet. ``duration_ns`` is how long a save takes.
+    """
+
+    def __init__(
+        self,
+        store: ObjectStore,
+        file: StateFile | None,
+        *,
+        duration_ns: int,
+        delivered: dict[Address, bytes],
+    ) -> None:
+        self._store = store
+        self._file = file
+        self._duration_ns = duration_ns
+        loaded = None if file is None else file.load()
+        self.problem = None if loaded is None else loaded.problem
+        if loaded is not None and loaded.memory is not None:
+            self.memory = loaded.memory
+        elif self.problem is not None:
+            self.memory = Memory()
+        else:
+            self.memory = Memory(saved=dict(delivered))
+        self._remanent: tuple[Cell, ...] = ()
+        self._drop_unknown()
+        for index, signature, act in (
+            (_SAVE_INDEX, SAVE_SIGNATURE, self._save),
+            (_LOAD_INDEX, LOAD_SIGNATURE, self._load),
+        ):
+            self._install(index, signature, act)
+
+    def keep_remanent(self, cells: Iterable[Cell]) -> None:
+        """Name the values that outlive a restart without being saved, and give them what was kept."""
+        self._remanent = tuple(cells)
+        kept = {cell.entry.address for cell in self._remanent}
+        self._store.restore(lambda entry: entry.address in kept, self.memory.remanent)
+
+    def recall(self, wanted: Callable[[Entry], bool]) -> None:
+        """Bring RAM to what a restart finds: saved values, else defaults. Remanent values stay."""
+        remanent = {cell.entry.address for cell in self._remanent}
+        self._store.restore(
+            lambda entry: entry.address not in remanent and wanted(entry),
+            self.memory.saved,
+        )
+
+    def keep(self) -> None:
+        """Write the remanent values to the file, if they changed. Raises OSError."""
+        now = {cell.entry.address: cell.to_bytes() for cell in self._remanent}
+        if now != self.memory.remanent:
+            self.memory.remanent = now
+            self._write()
+
+    def _drop_unknown(self) -> None:
+        """Leave out what the file holds of objects that the description does not have, or has in another size."""
+        for values in (self.memory.saved, self.memory.remanent):
+            for address, data in list(values.items()):
+                cell = self._store.find(address.major, address.minor)
+                if cell is None or (cell.size is not None and cell.size != len(data)):
+                    del values[address]
+                    self.problem = f"state of {address} does not fit the description and was left out"
+
+    def _install(self, index: int, signature: int, act: Callable[[Callable[[Entry], bool]], None]) -> None:
+        categories = {
+            command.address: command.category
+            for command in (*self._store.description.save, *self._store.description.load)
+        }
+        for cell in self._store:
+            if cell.entry.address.major != index or cell.entry.address.minor == 0:
+                continue
+            cell.source = lambda: _ON_COMMAND
+            cell.guard = _signature_guard(signature)
+            cell.effect = self._effect(act, _selection(categories.get(cell.entry.address)))
+
+    def _effect(self, act: Callable[[Callable[[Entry], bool]], None], wanted: Callable[[Entry], bool]) -> Effect:
+        def start(_raw: Raw) -> Deferred:
+            return Deferred(self._duration_ns, lambda _now_ns: act(wanted))
+
+        return start
+
+    def _save(self, wanted: Callable[[Entry], bool]) -> None:
+        for cell in self._store:
+            entry = cell.entry
+            # A live value (a measured temperature in a saved record) and a mirror are no parameters to keep.
+            if entry.saved and cell.source is None and _is_parameter(entry) and wanted(entry):
+                self.memory.saved[entry.address] = encode_raw(entry.type, cell.raw)
+        self._commit()
+
+    def _load(self, wanted: Callable[[Entry], bool]) -> None:
+        for address in list(self.memory.saved):
+            if wanted(self._store.at(address).entry):
+                del self.memory.saved[address]
+        self._commit()
+
+    def _commit(self) -> None:
+        self.memory.remanent = {cell.entry.address: cell.to_bytes() for cell in self._remanent}
+        try:
+            self._write()
+        except OSError as error:
+            self.problem = str(error)
+            raise RefusedAccessError(Abort.HARDWARE) from error
+
+    def _write(self) -> None:
+        if self._file is not None:
+            self._file.store(self.memory)
+
+
+def _is_parameter(entry: Entry) -> bool:
+    return entry.access.writable or entry.access is Access.FACTORY
+
+
+def _signature_guard(signature: int) -> Guard:
+    def check(raw: Raw) -> None:
+        if raw != signature:
+            raise RefusedAccessError(Abort.NOT_STORED)
+
+    return check
+
+
+def _selection(category: str | None) -> Callable[[Entry], bool]:
+    """What a save command covers: all, or the entries of its category."""
+    return lambda entry: category is None or entry.save_category == category
