@@ -1,0 +1,60 @@
+"""``hubside``: reads the command line, runs one use case, turns errors into exit codes.
+
+Exit codes: 0 done, 2 usage, 3 refused before sending, 4 refused by the device, 5 no answer, 6 sent but not verified.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import logging
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final
+
+from app import __version__
+from app.cli.output import Output
+from app.errors import HubsideError
+from app.model.texts import load_texts
+from app.settings import settings_from
+
+COMMANDS: Final = ("od", "twin", "bus", "recordings", "serve")
+"""Modules of this package, each with ``add_parser``."""
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """All commands with their arguments."""
+    parser = argparse.ArgumentParser(prog="hubside", description="The service bench for turbine pitch drives.")
+    parser.add_argument("--version", action="version", version=f"hubside {__version__}")
+    parser.add_argument("--json", action="store_true", help="results for machines")
+    parser.add_argument("--data", type=Path, metavar="DIR", help="where sets and recordings are kept")
+    parser.add_argument("--verbose", action="store_true", help="log what happens on stderr")
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    for name in COMMANDS:
+        importlib.import_module(f"app.cli.{name}").add_parser(commands)
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Entry point; gives the exit code."""
+    parsed = build_parser().parse_args(arguments)
+    logging.basicConfig(
+        level=logging.DEBUG if parsed.verbose else logging.WARNING,
+        format="%(asctime)s %(levelname)s %(name)s: %(message)s",
+        stream=sys.stderr,
+    )
+    parsed.settings = settings_from(os.environ, parsed.data)
+    output = Output(load_texts(parsed.settings.language), parsed.json)
+    try:
+        code: int = parsed.run(parsed, output)
+    except HubsideError as error:
+        output.error(error)
+        return error.exit_code
+    except KeyboardInterrupt:
+        return 130
+    except BrokenPipeError:  # the reader of our output went away, as `| head` does
+        sys.stdout = None
+        return 0
+    return code

@@ -1,0 +1,98 @@
+"""What the command line prints: results on stdout, progress and errors on stderr, JSON where asked for."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Sequence
+from typing import Any, TextIO
+
+from app.errors import (
+    DeviceError,
+    HubsideError,
+    NoAnswerError,
+    RefusedError,
+    SdoAbortError,
+    UnverifiedError,
+    UsageError,
+)
+from app.model.texts import Texts
+
+
+class Output:
+    """Speaks to the person or to the machine that called."""
+
+    def __init__(self, texts: Texts, as_json: bool, out: TextIO = sys.stdout, err: TextIO = sys.stderr) -> None:
+        self.texts = texts
+        self.as_json = as_json
+        self._out = out
+        self._err = err
+        self._open_progress = False
+
+    def line(self, text: str) -> None:
+        """One line of the result."""
+        print(text, file=self._out, flush=True)
+
+    def result(self, data: Any, text: str) -> None:
+        """The result: ``data`` as JSON for machines, ``text`` for people."""
+        self.line(json.dumps(data, ensure_ascii=False) if self.as_json else text)
+
+    def say(self, key: str, **details: Any) -> None:
+        """A remark on stderr."""
+        self._end_progress()
+        print(self.texts(key, **details), file=self._err, flush=True)
+
+    def progress(self, key: str, **details: Any) -> None:
+        """Progress on stderr: rewritten in place on a terminal, silent elsewhere."""
+        if self._err.isatty():
+            print(f"\r\x1b[K{self.texts(key, **details)}", end="", file=self._err, flush=True)
+            self._open_progress = True
+
+    def error(self, error: HubsideError) -> None:
+        """What went wrong, where, the state of the device, and what to do next."""
+        self._end_progress()
+        text = error_text(self.texts, error)
+        step = next_step(error)
+        if self.as_json:
+            details = {key: str(value) for key, value in error.details.items()}
+            print(
+                json.dumps({"error": error.code, "text": text, "details": details}, ensure_ascii=False), file=self._err
+            )
+        else:
+            print("hubside: " + text, file=self._err)
+            if step:
+                print("  " + self.texts(step), file=self._err)
+
+    def table(self, head: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+        """Columns as wide as they need."""
+        widths = [max(len(row[column]) for row in (head, *rows)) for column in range(len(head))]
+        for row in (head, *rows):
+            self.line("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip())
+
+    def _end_progress(self) -> None:
+        if self._open_progress:
+            print(file=self._err)
+            self._open_progress = False
+
+
+def error_text(texts: Texts, error: HubsideError) -> str:
+    """The operator's text of an error; an SDO abort code is given in words, the number behind."""
+    details = dict(error.details)
+    if isinstance(error, SdoAbortError):
+        words = texts(str(details.get("text_key_reason", "abort.unknown")))
+        details["reason"] = f"{words} (abort code {error.abort_code:08X}h)"
+    return texts(error.text_key, **details)
+
+
+def next_step(error: HubsideError) -> str | None:
+    """Text key of what to do next."""
+    for kind, key in (
+        (UsageError, "usage"),
+        (RefusedError, "refused"),
+        (DeviceError, "device"),
+        (NoAnswerError, "no_answer"),
+        (UnverifiedError, "unverified"),
+    ):
+        if isinstance(error, kind):
+            return None if kind is UsageError and type(error) is not UsageError else f"next_step.{key}"
+    return None

@@ -1,0 +1,63 @@
+"""``hubside twin``: digital twins of drives that answer on a simulated bus, as a process of their own."""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import sys
+import threading
+from pathlib import Path
+
+from app.cli.output import Output
+from app.errors import UsageError
+
+SWITCH_INTERVAL_S = 0.0005
+"""Threads of this process hand over faster than Python's 5 ms, else the bus would be late by as much."""
+
+
+def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Register the command."""
+    parser = commands.add_parser("twin", help="digital twins that answer on a simulated bus")
+    kinds = parser.add_subparsers(dest="kind", required=True)
+    oat = kinds.add_parser("oat", help="three blades, a PMM and a PMC each, on one CAN bus")
+    oat.add_argument("--can", default="socketcand:127.0.0.1:29536", metavar="socketcand:HOST:PORT")
+    oat.add_argument("--state", type=Path, metavar="DIR", help="where saved parameters are kept")
+    oat.add_argument("--bitrate", type=int, default=500_000)
+    oat.add_argument("--turnaround-ms", type=float, default=1.0, help="time a drive takes to answer")
+    oat.add_argument("--factory", action="store_true", help="allow writing of r(w) objects")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace, output: Output) -> int:
+    """Serve until interrupted."""
+    sys.setswitchinterval(SWITCH_INTERVAL_S)
+    host, port = _address(arguments.can)
+    from app.twins.turbine import serve_oat
+
+    stop = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: stop.set())
+    with serve_oat(
+        host=host,
+        port=port,
+        bitrate=arguments.bitrate,
+        state_dir=arguments.state,
+        turnaround_ns=round(arguments.turnaround_ms * 1e6),
+        factory=arguments.factory,
+    ) as server:
+        address = f"socketcand:{host}:{server.port}"
+        if output.as_json:
+            output.result({"address": address, "devices": server.devices, "bitrate": arguments.bitrate}, "")
+        else:
+            output.say("cli.twin_ready", count=server.devices, address=address, bitrate=arguments.bitrate)
+            output.say("cli.stop_hint")
+        stop.wait()
+    return 0
+
+
+def _address(text: str) -> tuple[str, int]:
+    interface, _, place = text.partition(":")
+    host, _, port = place.rpartition(":")
+    if interface != "socketcand" or not host or not port.isdigit():
+        raise UsageError(reason=f"'{text}': twins are served as socketcand:HOST:PORT")
+    return host, int(port)
