@@ -1,0 +1,117 @@
+"""Read devices completely and keep what was read as parameter sets."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Final
+
+from app import __version__
+from app.drivers.contract import Driver
+from app.errors import HubsideError, SdoAbortError
+from app.model.address import Address
+from app.model.datatypes import Raw
+from app.model.description import Description
+from app.model.sets import Identity, Origin, ParameterSet, dump_set
+from app.service.devices import Target, decode
+
+DeviceProgress = Callable[[Target, int, int], None]
+"""Called with the device, the objects done and the objects in all."""
+
+_IDENTITY: Final = {
+    "device_type": Address(0x1000),
+    "device_name": Address(0x1008),
+    "hardware": Address(0x1009),
+    "software": Address(0x100A),
+    "vendor_id": Address(0x1018, 1),
+    "product_code": Address(0x1018, 2),
+    "revision": Address(0x1018, 3),
+    "serial": Address(0x1018, 4),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class ReadReport:
+    """All that was read of one device; ``failed`` names every object that did not answer, and why."""
+
+    target: Target
+    values: Mapping[Address, Raw]
+    failed: Mapping[Address, HubsideError]
+
+
+def readable(description: Description) -> list[Address]:
+    """Addresses of all objects that can be read, in order."""
+    return [entry.address for entry in description if entry.access.readable]
+
+
+async def read_device(
+    driver: Driver,
+    target: Target,
+    addresses: Iterable[Address] | None = None,
+    on_progress: DeviceProgress | None = None,
+) -> ReadReport:
+    """Read ``addresses`` (all readable objects where None). Raises BusLostError; other errors are in the report."""
+    wanted = readable(target.description) if addresses is None else list(addresses)
+
+    def progress(done: int, total: int) -> None:
+        if on_progress is not None:
+            on_progress(target, done, total)
+
+    answers = await driver.read_many(target.node, wanted, on_progress=progress)
+    values: dict[Address, Raw] = {}
+    failed: dict[Address, HubsideError] = {}
+    for address, answer in answers.items():
+        if isinstance(answer, HubsideError):
+            failed[address] = answer
+        else:
+            values[address] = decode(target.entry(address), answer)
+    return ReadReport(target, values, failed)
+
+
+async def read_devices(
+    pairs: Iterable[tuple[Driver, Target]], on_progress: DeviceProgress | None = None
+) -> list[ReadReport]:
+    """Read many devices completely, all nodes at a time. Raises BusLostError."""
+    async with asyncio.TaskGroup() as group:
+        tasks = [group.create_task(read_device(driver, target, None, on_progress)) for driver, target in pairs]
+    return [task.result() for task in tasks]
+
+
+def to_set(report: ReadReport, turbine: str, person: str, reason: str, wall_ns: int) -> ParameterSet:
+    """The parameter set of a complete read."""
+    target = report.target
+    time = datetime.fromtimestamp(wall_ns / 1e9, UTC).isoformat(timespec="seconds").replace("+00:00", "Z")
+    found = {key: report.values.get(address) for key, address in _IDENTITY.items()}
+    return ParameterSet(
+        description_id=target.description.id,
+        description_version=target.description.version,
+        identity=Identity(**found),  # type: ignore[arg-type]  # the types are those of the description
+        origin=Origin(turbine, target.slug, target.node, time, person, reason, f"hubside {__version__}"),
+        values=report.values,
+        unread={address: why(error) for address, error in report.failed.items()},
+    )
+
+
+def why(error: HubsideError) -> str:
+    """Why an object was not read, for the set file."""
+    return f"abort {error.abort_code:08X}h" if isinstance(error, SdoAbortError) else error.code
+
+
+def write_set(folder: Path, parameters: ParameterSet) -> Path:
+    """Write a set file into ``folder``; its name holds device and time, and never replaces another file."""
+    folder.mkdir(parents=True, exist_ok=True)
+    time = parameters.origin.time.replace(":", "").replace("-", "")
+    stem = f"{parameters.origin.device.replace('/', '_')}_{time}"
+    text = dump_set(parameters)
+    for number in range(1, 1000):
+        path = folder / (f"{stem}.json" if number == 1 else f"{stem}_{number}.json")
+        try:
+            with path.open("x", encoding="utf-8", newline="\n") as file:
+                file.write(text)
+        except FileExistsError:
+            continue
+        return path
+    raise FileExistsError(stem)

@@ -1,0 +1,50 @@
+"""What each use case needs to know of one device: its place, its description, and what the live state knows of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from app.model.address import Address
+from app.model.datatypes import Raw, decode_raw
+from app.model.description import Description, Entry
+from app.model.site import Device
+from app.wire.live import LiveState
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """One device of the connected turbine."""
+
+    device: Device
+    description: Description
+    live: LiveState
+
+    @property
+    def slug(self) -> str:
+        """The device's path: turbine/station/device."""
+        return self.device.slug
+
+    @property
+    def node(self) -> int:
+        """Node number on its bus."""
+        return self.device.node
+
+    def lookup(self, address: Address) -> Raw | None:
+        """Latest raw value that was seen on the wire since the last boot-up, or None."""
+        reading = self.live.reading(self.device.bus, self.node, address)
+        entry = self.description.entries.get(address)
+        if reading is None or entry is None:
+            return None
+        return decode(entry, reading.data)
+
+    def entry(self, address: Address) -> Entry:
+        """The entry at ``address``. Raises UnknownObjectError."""
+        return self.description.entry(address)
+
+
+def decode(entry: Entry, data: bytes) -> Raw:
+    """Raw value of what came over the wire; bytes as they are where their length is not the type's."""
+    try:
+        return decode_raw(entry.type, data)
+    except ValueError:
+        return data

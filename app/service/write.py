@@ -1,0 +1,84 @@
+"""Write one parameter: checked before anything is sent, written, read back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from app.drivers.contract import Driver, Written
+from app.errors import DeviceError, HubsideError, NoAnswerError, UnverifiedError
+from app.model.address import Address
+from app.model.checks import check_write
+from app.model.datatypes import Raw
+from app.model.description import Entry, Verify
+from app.model.values import depends_on, parse, show
+from app.service.devices import Target, decode
+from app.service.journal import Journal, Kind
+
+
+@dataclass(frozen=True, slots=True)
+class WriteResult:
+    """What happened to one object. ``read`` is None where the description proves a write by other means."""
+
+    address: Address
+    was: Raw | None
+    sent: Raw
+    read: Raw | None
+    verified: bool
+    how: Written
+
+
+async def write_text(
+    driver: Driver, target: Target, address: Address, text: str, journal: Journal, *, factory: bool = False
+) -> WriteResult:
+    """As ``write_raw``, for what a person typed (see ``app.model.values.parse``)."""
+    entry = target.entry(address)
+    await _know_what_it_rests_on(driver, target, entry)
+    raw = parse(target.description, entry, text, target.lookup)
+    return await write_raw(driver, target, address, raw, journal, factory=factory)
+
+
+async def write_raw(
+    driver: Driver, target: Target, address: Address, raw: Raw, journal: Journal, *, factory: bool = False
+) -> WriteResult:
+    """Check, write once, read back.
+
+    Raises RefusedError (nothing was sent), DeviceError (the device refused), NoAnswerError, or UnverifiedError (sent,
+    but another value was read back, or none).
+    """
+    entry = target.entry(address)
+    await _know_what_it_rests_on(driver, target, entry)
+    data = check_write(target.description, entry, raw, target.lookup, factory=factory)
+    was = decode(entry, await driver.read(target.node, address, entry.timeout_s)) if entry.access.readable else None
+    shown = {"address": address.short, "name": entry.title, "was": _shown(target, entry, was)}
+    try:
+        how = await driver.write(target.node, address, data, entry.timeout_s, entry.verify)
+        read = await _read_back(driver, target, entry, data)
+    except HubsideError as error:
+        journal.note(Kind.WRITE_FAILED, target.slug, **shown, reason=error.code, now=_shown(target, entry, raw))
+        raise
+    journal.note(Kind.WRITTEN, target.slug, **shown, now=_shown(target, entry, raw))
+    return WriteResult(address, was, raw, read, read is not None, how)
+
+
+async def _know_what_it_rests_on(driver: Driver, target: Target, entry: Entry) -> None:
+    """Read the objects that unit, limits and preconditions rest on and that nobody has seen yet."""
+    unknown = [a for a in depends_on(entry) if a in target.description.entries and target.lookup(a) is None]
+    if unknown:
+        await driver.read_many(target.node, unknown)
+
+
+async def _read_back(driver: Driver, target: Target, entry: Entry, sent: bytes) -> Raw | None:
+    if entry.verify is not Verify.EQUAL or not entry.access.readable:
+        return None
+    details = {"address": entry.address.short, "name": entry.title, "sent": sent.hex(" ")}
+    try:
+        found = await driver.read(target.node, entry.address, entry.timeout_s)
+    except (NoAnswerError, DeviceError) as error:
+        raise UnverifiedError(**details, found="–", reason=error.code) from error
+    if found != sent:
+        raise UnverifiedError(**details, found=found.hex(" "), reason="another value was read back")
+    return decode(entry, found)
+
+
+def _shown(target: Target, entry: Entry, raw: Raw | None) -> str:
+    return "–" if raw is None else show(entry, raw, target.lookup)
