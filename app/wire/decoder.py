@@ -31,6 +31,7 @@ from app.wire.records import (
     SaveSeen,
     SdoAccess,
     SdoSeen,
+    Side,
     Source,
     StateSeen,
     SyncSeen,
@@ -117,6 +118,10 @@ class CanOpenDecoder:
             node.state = None
         return (*records, GapSeen(t_ns, self.bus, 0, reason))
 
+    def pdos(self, node: int) -> tuple[PdoRoute, ...]:
+        """The valid PDOs of ``node`` whose mapping is known, by the mapping in force. Raises KeyError outside 1..127."""
+        return self._nodes[node].layout.pdos
+
     # -- routes ----------------------------------------------------------------
 
     def _refresh(self, node: _Node) -> None:
@@ -166,8 +171,8 @@ class CanOpenDecoder:
                 if configures(record.address):
                     changed |= configuration.learn(record.address, record.data, record.source is Source.SDO_WRITE)
             elif isinstance(record, SdoSeen):
-                unsure = record.outcome in (Outcome.LOST, Outcome.BROKEN) and record.access is SdoAccess.WRITE
-                if unsure and configures(record.address):
+                unsure = record.outcome is not Outcome.DONE and record.aborted_by is not Side.SERVER
+                if unsure and record.access is SdoAccess.WRITE and configures(record.address):
                     changed |= configuration.forget(record.address)
             elif isinstance(record, SaveSeen) and record.done:
                 configuration.save(record.address)
