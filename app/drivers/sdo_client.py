@@ -3,9 +3,8 @@
 It lives on the receive thread of its port: an answer's callback sends the next request. Nothing here blocks, locks or
 knows asyncio. Three rules beyond CiA 301 keep a late answer from being taken for a later request's:
 
-* A request without an answer is aborted and remembered. Its answer, should it come, is booked to it and to nothing
-  else: an acknowledge or value of that kind and address, and an abort of that address (a server answers in order, so
-  the first abort belongs to the older request).
+* A request without an answer is aborted and remembered (``sdo_unanswered``). Its answer, should it come, is booked to
+  it and to nothing else.
 * A request that a remembered one could be taken for (same kind, same address) waits for a *fence*: another object is
   read first. Its answer proves that whatever was asked before has been answered or never will be.
 * Should a late acknowledge come after the fence all the same, the write that it seems to answer is doubtful, and is
@@ -21,7 +20,8 @@ from typing import Any, Final, Generic, Protocol, TypeVar
 
 from app.drivers.sdo_jobs import Counters, End, Steps, WriteStep
 from app.drivers.sdo_transfer import Kind, Step, Transfer, Upload
-from app.errors import BusLostError, NoAnswerError
+from app.drivers.sdo_unanswered import Claim, Unanswered
+from app.errors import BusLostError, HubsideError, NoAnswerError, RefusedError
 from app.model.address import Address
 from app.wire import sdo
 from app.wire.frame import Can, Direction, Frame
@@ -31,15 +31,11 @@ log = logging.getLogger(__name__)
 T = TypeVar("T")
 
 DEFAULT_TIMEOUT_NS: Final = 500_000_000
-FORGET_NS: Final = 60_000_000_000
-"""An answer later than this is not to be feared."""
 FENCE_TRIES: Final = 2
 FENCES: Final = (Address(0x1000), Address(0x1001), Address(0x1018, 1), Address(0x1018, 0))
 """Objects that every CANopen device has (CiA 301, 7.5.2): device type, error register, identity."""
 
 _BOOT_BASE: Final = 0x700
-_KIND_OF_SCS: Final[dict[int, Kind]] = {sdo.Command.SCS_UPLOAD: Kind.UPLOAD, sdo.Command.SCS_DOWNLOAD: Kind.DOWNLOAD}
-_NEVER_MEANT_FOR: Final[dict[int, Kind]] = {sdo.Abort.WRITE_ONLY: Kind.DOWNLOAD, sdo.Abort.READ_ONLY: Kind.UPLOAD}
 
 
 class Port(Protocol):
@@ -55,7 +51,7 @@ class Port(Protocol):
 class Job(Generic[T]):
     """Steps for one node and who is told of the result. ``on_done`` gets a result or an exception, never both.
 
-    ``urgent``: interrupts what runs at the node and goes first; it is never held back by a fence.
+    ``urgent``: interrupts what runs at the node and goes first; its write is never held back by a fence.
     ``fenced`` False: a late answer of an earlier request is as good as a fresh one (only for scans).
     """
 
@@ -71,21 +67,10 @@ class Job(Generic[T]):
         self.steps = steps
         self.on_done = on_done
         self.urgent = urgent
-        self.fenced = fenced and not urgent
+        self.fenced = fenced
         self.ask: Transfer | None = None
         """A transfer asked for and not sent yet, because the job was interrupted at its fence."""
         self.resume: End | None = None
-
-
-class _Unanswered:
-    """A request that was given up; ``flushed`` once a later answer has proved that the server owes it no answer."""
-
-    __slots__ = ("at_ns", "flushed", "transfer")
-
-    def __init__(self, transfer: Transfer, at_ns: int) -> None:
-        self.transfer = transfer
-        self.at_ns = at_ns
-        self.flushed = False
 
 
 class _Channel:
@@ -99,6 +84,7 @@ class _Channel:
         "node",
         "queue",
         "request_id",
+        "sure",
         "transfer",
         "unanswered",
         "wanted",
@@ -116,7 +102,9 @@ class _Channel:
         self.wanted: Transfer | None = None
         """The job's transfer while a fence runs before it."""
         self.deadline_ns = 0
-        self.unanswered: dict[tuple[bytes, Kind], _Unanswered] = {}
+        self.unanswered = Unanswered()
+        self.sure = True
+        """No unanswered request could be taken for the transfer on the wire."""
 
     # -- jobs ---------------------------------------------------------------
 
@@ -141,24 +129,23 @@ class _Channel:
             self.queue.remove(job)
             job.steps.close()
 
-    def abort_current(self) -> bool:
+    def abort_current(self) -> None:
         job, transfer = self.job, self.transfer
         if job is None or transfer is None:
-            return False
+            return
         self._give_up(sdo.Abort.GENERAL)
         self.job = None
         job.steps.close()
         error = NoAnswerError(node=self.node, address=str(transfer.address), timeout_s=0, reason="interrupted")
         self._deliver(job, None, error)
         self._next_job()
-        return True
 
-    def lose(self, error: BusLostError) -> None:
+    def lose(self, error: HubsideError) -> None:
         job, self.job = self.job, None
         queued = list(self.queue)
         self.queue.clear()
         if self.transfer is not None:
-            self._remember(self.transfer)
+            self.unanswered.remember(self.transfer, self.client.now_ns())
         self.transfer = self.wanted = None
         if job is not None:
             self._lose_running(job, error)
@@ -166,7 +153,7 @@ class _Channel:
             other.steps.close()
             self._deliver(other, None, error)
 
-    def _lose_running(self, job: Job[Any], error: BusLostError) -> None:
+    def _lose_running(self, job: Job[Any], error: HubsideError) -> None:
         try:
             job.steps.send(End.LOST)
         except StopIteration as stop:
@@ -221,32 +208,31 @@ class _Channel:
     # -- the running transfer -----------------------------------------------
 
     def _begin(self, ask: Transfer) -> None:
-        older = self._older(ask) if self.unanswered else None
-        if older is not None:
+        alike = self.unanswered.alike(ask, self.client.now_ns()) if self.unanswered else None
+        if alike is not None:
             if isinstance(ask, WriteStep):
                 ask.doubtful = True
-            if not older.flushed and self.job is not None and self.job.fenced:
+            job = self.job
+            hurried = job is not None and job.urgent and isinstance(ask, WriteStep)
+            if not alike.flushed and job is not None and job.fenced and not hurried:
                 self.fence_fails = 0
                 self._send_fence(ask)
                 return
         self._send(ask)
 
-    def _older(self, ask: Transfer) -> _Unanswered | None:
-        """An unanswered request that could be taken for ``ask``."""
-        oldest_ns = self.client.now_ns() - FORGET_NS
-        for key in [key for key, entry in self.unanswered.items() if entry.at_ns < oldest_ns]:
-            del self.unanswered[key]
-        return self.unanswered.get((ask.mux, ask.kind))
-
     def _send_fence(self, ask: Transfer) -> None:
         self.client.counters.fences += 1
         self.wanted = ask
         usable = [a for a in FENCES if a != ask.address]
-        free = [a for a in usable if (sdo.upload_request(a)[1:4], Kind.UPLOAD) not in self.unanswered]
+        free = [a for a in usable if not self.unanswered.has(sdo.upload_request(a)[1:4], Kind.UPLOAD)]
         self._send(Upload((free or usable)[0], DEFAULT_TIMEOUT_NS))
 
     def _send(self, transfer: Transfer) -> None:
         self.transfer = transfer
+        self.sure = True
+        if self.unanswered:
+            alike = self.unanswered.alike(transfer, self.client.now_ns())
+            self.sure = alike is None or alike.flushed
         self.client.counters.transfers += 1
         self._transmit(transfer)
 
@@ -257,8 +243,7 @@ class _Channel:
         client.port.send(Can(self.request_id, transfer.request))
 
     def on_response(self, data: bytes) -> None:
-        if self.unanswered and self._belongs_to_unanswered(data):
-            self.client.counters.late += 1
+        if self.unanswered and not self._is_for_running(data):
             return
         transfer = self.transfer
         step = Step.IGNORED if transfer is None else transfer.feed(data)
@@ -275,45 +260,29 @@ class _Channel:
             self.client.port.send(Can(self.request_id, transfer.request))
             self._end(transfer, End.BROKEN)
 
-    def _belongs_to_unanswered(self, data: bytes) -> bool:
-        """Book a late answer to the request that was given up."""
-        if len(data) != 8:
-            return False
-        running, mux, command = self.transfer, data[1:4], data[0] >> 5
-        kind = _KIND_OF_SCS.get(command)
-        if kind is not None:
-            if running is not None and running.mux == mux and running.kind is kind:
-                return False
-            return self.unanswered.pop((mux, kind), None) is not None
-        if command != sdo.Command.ABORT:
-            return False
-        code = int.from_bytes(data[4:], "little")
-        for key, entry in self.unanswered.items():
-            owed_to_running = entry.flushed and running is not None and running.mux == mux
-            if key[0] == mux and not owed_to_running and _NEVER_MEANT_FOR.get(code) is not key[1]:
-                entry.transfer.late_abort = code
-                del self.unanswered[key]
-                return True
+    def _is_for_running(self, data: bytes) -> bool:
+        claim = self.unanswered.claim(data, self.transfer, self.sure)
+        if claim is Claim.RUNNING:
+            return True
+        self.client.counters.late += 1
+        if claim is Claim.UNCLEAR and self.transfer is not None:
+            transfer, self.transfer = self.transfer, None
+            self.unanswered.still_owed(transfer)
+            self._without_answer()
         return False
 
     def _end(self, transfer: Transfer, end: End) -> None:
         self.transfer = None
         if self.unanswered:
-            for entry in self.unanswered.values():
-                entry.flushed = True
+            if self.sure:
+                self.unanswered.flush()
+            if end is End.DONE and isinstance(transfer, WriteStep) and transfer.doubtful:
+                self.unanswered.still_owed(transfer)
         if self.wanted is not None:
             wanted, self.wanted = self.wanted, None
             self._send(wanted)
         elif self.job is not None:
-            if end is End.DONE and isinstance(transfer, WriteStep) and transfer.doubtful:
-                self._still_owed(transfer)
             self._continue(self.job, end)
-
-    def _still_owed(self, transfer: Transfer) -> None:
-        """One of two acknowledges has come, and nothing tells which: the other is still remembered."""
-        older = self.unanswered.get((transfer.mux, transfer.kind))
-        if older is not None:
-            self.unanswered[(transfer.mux, transfer.kind)] = _Unanswered(transfer, older.at_ns)
 
     def _continue(self, job: Job[Any], end: End) -> None:
         self._advance(job, end)
@@ -327,7 +296,13 @@ class _Channel:
         self.client.counters.timeouts += 1
         wanted = self.wanted
         self._give_up(sdo.Abort.TIMED_OUT)
-        job = self.job
+        self.wanted = wanted
+        self._without_answer()
+
+    def _without_answer(self) -> None:
+        """The transfer on the wire is over without an answer; where it was a fence, another one is tried."""
+        job, wanted = self.job, self.wanted
+        self.wanted = None
         if job is None:
             return
         if wanted is None:
@@ -350,11 +325,8 @@ class _Channel:
         transfer = self.transfer
         self.transfer = self.wanted = None
         if transfer is not None:
-            self._remember(transfer)
+            self.unanswered.remember(transfer, self.client.now_ns())
             self.client.port.send(Can(self.request_id, transfer.abort(code)))
-
-    def _remember(self, transfer: Transfer) -> None:
-        self.unanswered[(transfer.mux, transfer.kind)] = _Unanswered(transfer, self.client.now_ns())
 
 
 class SdoClient:
@@ -376,15 +348,12 @@ class SdoClient:
         """Drop ``job``; a transfer of it that is on the wire is aborted. Its ``on_done`` is not called."""
         self._guarded(self._channels[node].cancel, job)
 
-    def abort_current(self, node: int) -> bool:
-        """Abort the running transfer of ``node``; its job ends with NoAnswerError. False where nothing ran."""
-        channel = self._channels[node]
-        running = channel.transfer is not None
-        self._guarded(_Channel.abort_current, channel)
-        return running
+    def abort_current(self, node: int) -> None:
+        """Abort the transfer that runs at ``node``, if any; its job ends with NoAnswerError."""
+        self._guarded(_Channel.abort_current, self._channels[node])
 
-    def lose(self, error: BusLostError) -> None:
-        """The bus is gone: every job ends with ``error``."""
+    def lose(self, error: HubsideError) -> None:
+        """Nothing can be sent any more: every job ends, with ``error`` or with one that says what was lost."""
         for channel in self._channels.values():
             channel.lose(error)
 
@@ -424,8 +393,8 @@ class SdoClient:
             self.arm(min(waiting))
 
     def _guarded(self, action: Callable[[Any], object], argument: object) -> None:
-        """A send that fails means that the bus is gone, for every node."""
+        """A send that fails means that the bus is gone or must not be sent to, for every node."""
         try:
             action(argument)
-        except BusLostError as error:
+        except (BusLostError, RefusedError) as error:
             self.lose(error)

@@ -10,6 +10,7 @@ from collections.abc import Generator, Mapping
 from enum import Enum
 from typing import Final, TypeVar
 
+from app.drivers.contract import Written
 from app.drivers.sdo_transfer import Download, Transfer, Upload
 from app.errors import BusLostError, HubsideError, NoAnswerError, ProtocolError, SdoAbortError, UnverifiedError
 from app.model.address import Address
@@ -124,13 +125,6 @@ def _read_error(node: int, transfer: Transfer, end: End, bus: str) -> HubsideErr
     return NoAnswerError(node=node, address=str(transfer.address), timeout_s=transfer.timeout_ns / 1e9)
 
 
-class Written(Enum):
-    """How a write that succeeded is known to have: by its acknowledge, or, after a time-out, by reading back."""
-
-    ACKNOWLEDGED = "acknowledged"
-    READ_BACK = "read_back"
-
-
 class WriteStep(Download):
     """A download that knows whether its acknowledge could be that of an earlier, given up write to the same object."""
 
@@ -181,6 +175,7 @@ def _decide(node: int, written: Transfer, readback: Upload, end: End, verify: Ve
         raise NoAnswerError(node=node, address=str(address), timeout_s=written.timeout_ns / 1e9, outcome="unknown")
     found = readback.data.hex() if end is End.DONE else None
     if end is End.DONE and verify is Verify.EQUAL and readback.data == written.data:
+        written.executed = True
         return Written.READ_BACK
     reason = "differs" if end is End.DONE and verify is Verify.EQUAL else "outcome unknown"
     raise UnverifiedError(node=node, address=str(address), sent=written.data.hex(), found=found, reason=reason)

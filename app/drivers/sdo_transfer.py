@@ -50,6 +50,7 @@ class Transfer:
         "abort_code",
         "address",
         "data",
+        "executed",
         "late_abort",
         "mux",
         "request",
@@ -67,6 +68,8 @@ class Transfer:
         self.abort_code = 0
         self.late_abort: int | None = None
         """Set by the client where the server's abort came after the transfer was given up."""
+        self.executed = False
+        """Set by its job where reading has shown that a write without an answer was executed."""
         self._initiated = False
         self._toggle = False
         self._size: int | None = None

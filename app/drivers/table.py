@@ -1,0 +1,27 @@
+"""The drivers by the bus they speak. A driver, and with it its library, is imported when it is first asked for."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any, Final
+
+from app.errors import UsageError
+from app.model.description import Bus
+
+DRIVERS: Final[dict[Bus, tuple[str, str]]] = {
+    Bus.CANOPEN: ("app.drivers.canopen", "CanOpenDriver"),
+}
+"""Module and class of each driver."""
+
+
+def driver_class(bus: Bus) -> type[Any]:
+    """The driver of ``bus``. Raises UsageError where there is none, or where its library is not installed."""
+    try:
+        module, name = DRIVERS[bus]
+    except KeyError:
+        raise UsageError(reason=f"there is no driver for {bus.value}") from None
+    try:
+        found: type[Any] = getattr(import_module(module), name)
+    except ModuleNotFoundError as error:
+        raise UsageError(reason=f"{bus.value} needs the package {error.name}") from error
+    return found
