@@ -10,14 +10,12 @@ import contextlib
 import errno
 import logging
 import os
-import socket
-import struct
 import time
-from typing import Any, Final, Protocol
+from typing import Final, Protocol
 
 import can
 
-from app.drivers.can_config import CanConfig, CanInterface
+from app.drivers.can_config import CanConfig
 from app.drivers.socketcand import Received, SocketcandBus
 from app.wire.frame import Can
 
@@ -71,14 +69,14 @@ class SocketcandLink:
         try:
             return self._bus.recv_many(timeout_s)
         except can.CanError as error:
-            raise LinkError(_text(error)) from error
+            raise LinkError(error_text(error)) from error
 
     def send(self, frame: Can) -> None:
         """See CanLink."""
         try:
             self._bus.send_frame(frame)
         except can.CanError as error:
-            raise LinkError(_text(error)) from error
+            raise LinkError(error_text(error)) from error
 
     def close(self) -> None:
         """See CanLink."""
@@ -116,7 +114,7 @@ class PythonCanLink:
             if received:
                 _LOG.info("the adapter failed after %d frames of a batch: %s", len(received), error)
                 return received
-            raise LinkError(_text(error)) from error
+            raise LinkError(error_text(error)) from error
         return received
 
     def send(self, frame: Can) -> None:
@@ -125,103 +123,21 @@ class PythonCanLink:
             self.bus.send(message_of(frame), timeout=0.1)
         except can.CanOperationError as error:
             if error.error_code == errno.ENOBUFS or "buffer full" in str(error):
-                raise LinkBusyError(_text(error)) from error
-            raise LinkError(_text(error)) from error
+                raise LinkBusyError(error_text(error)) from error
+            raise LinkError(error_text(error)) from error
         except Exception as error:
-            raise LinkError(_text(error)) from error
+            raise LinkError(error_text(error)) from error
 
     def close(self) -> None:
         """See CanLink."""
         try:
             self.bus.shutdown()
         except Exception as error:  # noqa: BLE001 - an adapter that is gone cannot be told to close
-            _LOG.info("while closing the adapter: %s", _text(error))
+            _LOG.info("while closing the adapter: %s", error_text(error))
             port = getattr(self.bus, "serialPortOrig", None)
             if port is not None:
                 with contextlib.suppress(OSError):
                     port.close()
-
-
-class SocketcanLink(PythonCanLink):
-    """SocketCAN, read with what python-can does not ask for: a large receive buffer and the count of dropped frames.
-
-    python-can's own reader cannot be used with that count: it expects one piece of ancillary data.
-    """
-
-    _SO_RXQ_OVFL: Final = 40
-    _SO_TIMESTAMPNS: Final = 35
-    _SO_RCVBUFFORCE: Final = 33
-    _BUFFER_BYTES: Final = 4 << 20
-    _FRAME: Final = struct.Struct("=IB3x8s")
-    _ANCILLARY_BYTES: Final = 128
-
-    def __init__(self, bus: can.BusABC) -> None:
-        super().__init__(bus)
-        self._socket: socket.socket = bus.socket  # type: ignore[attr-defined]
-        try:
-            self._socket.setsockopt(socket.SOL_SOCKET, self._SO_RCVBUFFORCE, self._BUFFER_BYTES)
-        except OSError:
-            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, self._BUFFER_BYTES)
-        self._socket.setsockopt(socket.SOL_SOCKET, self._SO_RXQ_OVFL, 1)
-        self._socket.setblocking(False)
-
-    def recv_many(self, timeout_s: float) -> list[Received]:
-        """See CanLink; the caller has waited with ``select``, so ``timeout_s`` is not used."""
-        received: list[Received] = []
-        try:
-            while len(received) < _BATCH:
-                data, ancillary, flags, _ = self._socket.recvmsg(self._FRAME.size, self._ANCILLARY_BYTES)
-                t_ns = self._read_ancillary(ancillary)
-                if not flags & socket.MSG_DONTROUTE or not flags & socket.MSG_CONFIRM:
-                    received.append((self.parse(data), t_ns))
-        except BlockingIOError:
-            return received
-        except (OSError, struct.error) as error:
-            if received:
-                return received
-            raise LinkError(_text(error)) from error
-        return received
-
-    def _read_ancillary(self, ancillary: list[tuple[int, int, bytes]]) -> int | None:
-        t_ns = None
-        for level, kind, data in ancillary:
-            if level == socket.SOL_SOCKET and kind == self._SO_TIMESTAMPNS:
-                seconds, nanos = struct.unpack_from("@ll", data)
-                t_ns = seconds * 1_000_000_000 + nanos
-            elif level == socket.SOL_SOCKET and kind == self._SO_RXQ_OVFL:
-                self.dropped = struct.unpack_from("=I", data)[0]
-        return t_ns
-
-    @classmethod
-    def parse(cls, data: bytes) -> Can:
-        """A ``struct can_frame`` of linux/can.h. Raises struct.error where it has another size."""
-        raw_id, length, payload = cls._FRAME.unpack(data)
-        extended, remote, error = bool(raw_id >> 31), bool(raw_id >> 30 & 1), bool(raw_id >> 29 & 1)
-        can_id = raw_id & (0x1FFFFFFF if extended or error else 0x7FF)
-        if remote:
-            return Can(can_id, b"", extended, remote=True, dlc=length)
-        return Can(can_id, payload[: min(length, 8)], extended, error=error)
-
-
-def open_link(config: CanConfig, timeout_s: float) -> CanLink:
-    """Open the adapter. Raises LinkError.
-
-    ``timeout_s`` holds for socketcand; other interfaces take the time that their drivers take.
-    """
-    try:
-        if config.interface is CanInterface.SOCKETCAND:
-            return SocketcandLink(config, timeout_s)
-        arguments = config.bus_arguments()
-        if config.interface is CanInterface.SLCAN:
-            arguments.setdefault("sleep_after_open", _SLCAN_SETTLE_S)
-            if _POSIX:
-                arguments.setdefault("timeout", 0)
-        if config.interface is CanInterface.PCAN and config.listen_only:
-            arguments["state"] = can.BusState.PASSIVE
-        bus = can.Bus(ignore_config=True, **arguments)
-        return SocketcanLink(bus) if config.interface is CanInterface.SOCKETCAN else PythonCanLink(bus)
-    except Exception as error:
-        raise LinkError(_text(error)) from error
 
 
 def message_of(frame: Can) -> can.Message:
@@ -244,8 +160,6 @@ def _received(message: can.Message) -> Received:
     return Can(message.arbitration_id, data, message.is_extended_id, error=message.is_error_frame), t_ns
 
 
-def _text(error: BaseException) -> str:
+def error_text(error: BaseException) -> str:
+    """What went wrong, never empty."""
     return str(error) or type(error).__name__
-
-
-__all__: list[Any] = ["CanLink", "LinkBusyError", "LinkError", "message_of", "open_link"]

@@ -26,7 +26,8 @@ from itertools import count
 from typing import Final, NamedTuple
 
 from app.drivers.can_config import CanConfig
-from app.drivers.can_link import CanLink, LinkBusyError, LinkError, open_link
+from app.drivers.can_link import CanLink, LinkBusyError, LinkError
+from app.drivers.can_open import open_link
 from app.drivers.socketcand import Received
 from app.errors import BusLostError, BusOpenError, RefusedError
 from app.wire.frame import Can, Direction, Frame, Stamper
@@ -107,6 +108,9 @@ class CanPort:
         monotonic_ns: Callable[[], int] = time.monotonic_ns,
     ) -> None:
         self.bus = bus
+        self.gather_s = 0.0
+        """After a batch, let frames gather for this long before the next is read: less load at high rates, paid for
+        with as much latency. Calls, timers and our own frames do not wait. To be left at 0 while an engine reacts."""
         self._config = config
         self._stamper = stamper
         self._monotonic_ns = monotonic_ns
@@ -267,22 +271,28 @@ class CanPort:
                 self._lose(link, failure)
             elif link is not None and link.dropped != self._link_dropped:
                 self._note_dropped(link)
+            if received and self.gather_s > 0:
+                due_s = self._wait_s()
+                self._wait(None, self.gather_s if due_s is None else min(self.gather_s, due_s))
         self._shut()
 
     def _receive(self, link: CanLink | None, wait_s: float | None) -> list[Received]:
         fileno = None if link is None else link.fileno()
         if link is not None and fileno is None:
             return link.recv_many(_POLL_S if wait_s is None else min(wait_s, _POLL_S))
+        return link.recv_many(0) if self._wait(fileno, wait_s) and link is not None else []
+
+    def _wait(self, fileno: int | None, wait_s: float | None) -> bool:
+        """Wait until ``fileno`` is readable (True), we are woken, or ``wait_s`` is over. Raises LinkError."""
         wake = self._wake_rx
-        waited_for = [each for each in (wake, fileno) if each is not None]
         try:
-            ready = select.select(waited_for, (), (), wait_s)[0]
+            ready = select.select([each for each in (wake, fileno) if each is not None], (), (), wait_s)[0]
         except (OSError, ValueError) as error:
             raise LinkError(str(error)) from error
         if wake is not None and wake in ready:
             with suppress(BlockingIOError):
                 wake.recv(4096)
-        return link.recv_many(0) if link is not None and fileno in ready else []
+        return fileno in ready
 
     def _wait_s(self) -> float | None:
         if self._soon or self._tapped or self._reopened is not None:

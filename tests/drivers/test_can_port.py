@@ -17,8 +17,9 @@ import can
 import pytest
 
 from app.drivers.can_config import CanConfig, CanInterface, parse_can
-from app.drivers.can_link import SocketcanLink
 from app.drivers.can_port import CanPort, PortState, PortStatus, Timer
+from app.drivers.slcan import format_line, parse_line
+from app.drivers.socketcan import SocketcanLink
 from app.errors import BusLostError, BusOpenError, RefusedError
 from app.twins.line import CanLine
 from app.twins.line_thread import LineThread
@@ -204,6 +205,22 @@ def test_calls_and_timers_on_the_receive_thread(bench: Bench) -> None:
     assert calls[0][1] != threading.get_ident()
 
 
+def test_gathering_makes_fewer_batches_and_delays_no_call(bench: Bench) -> None:
+    batches: list[int] = []
+    bench.port.add_listener(lambda frames: batches.append(len(frames)))
+    bench.port.gather_s = 0.05
+    bench.send(*(Can(0x181, bytes(8)) for _ in range(500)))
+    bench.witness.wait_for(lambda: len(bench.witness.frames) == 500)
+    # 500 frames take about 60 ms of the line: a batch for each of them would be 500.
+    assert len(batches) <= 20
+    bench.port.gather_s = 30.0
+    bench.send(Can(0x182))
+    bench.witness.wait_for(lambda: Can(0x182) in bench.witness.received())
+    called = threading.Event()
+    bench.port.call_soon(called.set)
+    assert called.wait(5)
+
+
 def test_a_cut_connection_comes_back_and_the_gap_is_told(bench: Bench) -> None:
     bench.send(Can(1))
     bench.witness.wait_for(lambda: len(bench.witness.frames) == 1)
@@ -299,6 +316,25 @@ def test_socketcan_frames_as_the_kernel_gives_them() -> None:
     assert parse(kernel(0x40000701, 1, b"")) == Can(0x701, remote=True, dlc=1)
     assert parse(kernel(0xC0000701, 8, b"")) == Can(0x701, extended=True, remote=True, dlc=8)
     assert parse(kernel(0x20000004, 8, bytes(8))) == Can(4, bytes(8), error=True)
+
+
+def test_slcan_lines_both_ways() -> None:
+    frames = {
+        b"t18120102": Can(0x181, b"\x01\x02"),
+        b"t0800": Can(0x080),
+        b"T1ABCDEF01FF": Can(0x1ABCDEF0, b"\xff", extended=True),
+        b"r7011": Can(0x701, remote=True, dlc=1),
+        b"R000007018": Can(0x701, extended=True, remote=True, dlc=8),
+    }
+    for line, frame in frames.items():
+        assert parse_line(line) == frame
+        assert format_line(frame) == line + b"\r"
+    assert parse_line(b"t0801AA1F3C") == Can(0x080, b"\xaa")
+    for answer in (b"", b"z", b"Z", b"V1013", b"F00"):
+        assert parse_line(answer) is None
+    for damaged in (b"t", b"t18", b"t1812", b"t181201", b"t1819", b"tFFF0", b"txyz0", b"T1ABCDEF", b"t1811GG"):
+        with pytest.raises((ValueError, IndexError)):
+            parse_line(damaged)
 
 
 class SlcanAdapter:
