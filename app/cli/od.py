@@ -11,7 +11,7 @@ from app.model.address import parse_address
 from app.model.checks import limits_of
 from app.model.description import Description, Entry
 from app.model.description_file import BUILTIN, builtin_folder, load, load_builtin, problems
-from app.model.eds_write import write_all, to_eds
+from app.model.eds_write import to_eds, write_all
 from app.model.od_export import to_csv, to_json
 from app.model.values import show
 
@@ -78,7 +78,9 @@ def _show(description: Description, address: str | None, output: Output) -> int:
         output.table(("ADDRESS", "NAME", "TYPE", "ACCESS", "PDO", "DEFAULT", "UNIT", "SAVED", "CLASS"), rows)
         return 0
     wanted = parse_address(address)
-    entries = [e for e in description if e.address == wanted or (e.address.major == wanted.major and ":" not in address)]
+    entries = [
+        e for e in description if e.address == wanted or (e.address.major == wanted.major and ":" not in address)
+    ]
     for entry in entries or [description.entry(wanted)]:
         _detail(description, entry, output)
     return 0

@@ -31,11 +31,11 @@ class Target:
 
     def lookup(self, address: Address) -> Raw | None:
         """Latest raw value that was seen on the wire since the last boot-up, or None."""
-        reading = self.live.reading(self.device.bus, self.node, address)
+        view = self.live.value(self.device.bus, self.node, address)
         entry = self.description.entries.get(address)
-        if reading is None or entry is None:
+        if view is None or view.reading is None or entry is None:
             return None
-        return decode(entry, reading.data)
+        return decode(entry, view.reading.data)
 
     def entry(self, address: Address) -> Entry:
         """The entry at ``address``. Raises UnknownObjectError."""

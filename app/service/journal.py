@@ -21,7 +21,7 @@ class Severity(Enum):
 
 
 class Kind(Enum):
-    """What an event is about; the value is the end of its text key ``event.…``."""
+    """What an event is about; the value is the end of its text key ``journal.…``."""
 
     CONNECTED = "connected"
     BUS_LOST = "bus_lost"
@@ -60,7 +60,7 @@ class Entry:
     @property
     def text_key(self) -> str:
         """Key of its text."""
-        return f"event.{self.kind.value}"
+        return f"journal.{self.kind.value}"
 
 
 class Journal:

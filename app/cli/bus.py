@@ -1,0 +1,328 @@
+"""Commands on a bus: scan, read, write, save, restart, backup, record."""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import contextlib
+import signal
+import sys
+import time
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import asynccontextmanager
+from typing import Any
+
+from app.cli.output import Output, error_text
+from app.cli.targets import add_connection, bare_turbine, find_device, scanned_turbine, site_turbine
+from app.drivers.contract import FoundNode
+from app.errors import HubsideError, UsageError
+from app.model.address import parse_address
+from app.model.checks import check_read
+from app.model.datatypes import Raw
+from app.model.description import Description, Entry
+from app.model.description_file import BUILTIN, load_builtin
+from app.model.site import Turbine
+from app.model.values import show, to_scaled
+from app.service.backup import read_device, read_devices, readable, to_set, write_set
+from app.service.connection import Connection
+from app.service.devices import Target
+from app.service.options import Options
+from app.service.save import restart, save
+from app.service.write import write_text
+
+SWITCH_INTERVAL_S = 0.0005
+"""The receive thread gets its turn sooner than Python's 5 ms, so that a request follows an answer at once."""
+
+
+def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Register the commands."""
+
+    def command(name: str, run: Callable[..., Awaitable[int]], text: str) -> argparse.ArgumentParser:
+        parser = commands.add_parser(name, help=text)
+        add_connection(parser)
+        parser.set_defaults(run=lambda arguments, output: _run(run(arguments, output)))
+        return parser
+
+    command("scan", _scan, "find and identify the devices of a bus")
+    read = command("read", _read, "read objects of a device, or all of it")
+    read.add_argument("target", help="TURBINE/STATION/DEVICE or a node number")
+    read.add_argument("address", nargs="*", help="6065, 3110:01; all objects where none is named")
+    write = command("write", _write, "write one parameter: checked, written, read back")
+    write.add_argument("target", help="TURBINE/STATION/DEVICE or a node number")
+    write.add_argument("address")
+    write.add_argument("value", help="49.5, '49,5 °C', 0x1F, raw:495 or the name of an enumeration")
+    write.add_argument("--factory", action="store_true", help="allow r(w) objects")
+    write.add_argument("--save", action="store_true", help="then save to non-volatile memory")
+    saving = command("save", _save, "save the parameters of a device to its non-volatile memory")
+    saving.add_argument("target", help="TURBINE/STATION/DEVICE or a node number")
+    restarting = command("restart", _restart, "restart a device (NMT reset node)")
+    restarting.add_argument("target", help="TURBINE/STATION/DEVICE or a node number")
+    backup = command("backup", _backup, "read devices completely and write set files")
+    backup.add_argument("target", nargs="*", help="devices; all of them where none is named")
+    backup.add_argument("--reason", default="", help="why, kept in the set")
+    record = command("record", _record, "record all frames to MCAP until interrupted")
+    record.add_argument("--seconds", type=float, help="end by itself after so long")
+
+
+def _run(command: Awaitable[int]) -> int:
+    sys.setswitchinterval(SWITCH_INTERVAL_S)
+
+    async def main() -> int:
+        return await command
+
+    return asyncio.run(main())
+
+
+@asynccontextmanager
+async def connected(
+    arguments: argparse.Namespace, output: Output, record: bool | None = None
+) -> AsyncIterator[Connection]:
+    """The connection that the arguments name; on a bare bus the devices are found by a scan first."""
+    turbine = site_turbine(arguments)
+    if turbine is None:
+        turbine = scanned_turbine(arguments.can, await _find(arguments, output))
+    connection = _connection(arguments, turbine, arguments.record if record is None else record)
+    async with connection:
+        yield connection
+
+
+def _connection(arguments: argparse.Namespace, turbine: Turbine, record: bool) -> Connection:
+    settings = arguments.settings
+    options = Options(
+        person=settings.person,
+        recordings=settings.recordings if record else None,
+        consent=arguments.consent,
+        listen_s=arguments.listen_s,
+    )
+    return Connection(turbine, _descriptions(), options)
+
+
+def _descriptions() -> dict[str, Description]:
+    return {name: load_builtin(name) for name in BUILTIN}
+
+
+async def _find(arguments: argparse.Namespace, output: Output) -> list[FoundNode]:
+    turbine = site_turbine(arguments) or bare_turbine(arguments.can)
+    output.say("cli.listening", bus=", ".join(bus.connection for bus in turbine.buses))
+    async with _connection(arguments, turbine, False) as connection:
+        found = [await link.driver.scan() for link in connection.buses.values()]
+    return [node for nodes in found for node in nodes]
+
+
+async def _scan(arguments: argparse.Namespace, output: Output) -> int:
+    started = time.monotonic()
+    found = await _find(arguments, output)
+    if output.as_json:
+        output.result([_found_dict(node) for node in found], "")
+    elif found:
+        head = ("NODE", "TYPE", "NAME", "HARDWARE", "SOFTWARE", "SERIAL", "DESCRIPTION")
+        output.table(head, [_found_row(node) for node in found])
+    output.say("cli.found", count=len(found), took_s=f"{time.monotonic() - started:.1f}")
+    return 0 if found else 5
+
+
+def _found_row(node: FoundNode) -> tuple[str, ...]:
+    kind = "–" if node.device_type is None else f"{node.device_type:08X}h"
+    serial = "–" if node.identity.serial is None else str(node.identity.serial)
+    return (
+        str(node.node),
+        kind,
+        node.device_name or "–",
+        node.hardware or "–",
+        node.software or "–",
+        serial,
+        node.description_id or "–",
+    )
+
+
+def _found_dict(node: FoundNode) -> dict[str, Any]:
+    return {
+        "node": node.node,
+        "device_type": node.device_type,
+        "device_name": node.device_name,
+        "hardware": node.hardware,
+        "software": node.software,
+        "vendor": node.identity.vendor,
+        "product": node.identity.product,
+        "revision": node.identity.revision,
+        "serial": node.identity.serial,
+        "description": node.description_id,
+        "twin": node.is_twin,
+    }
+
+
+async def _read(arguments: argparse.Namespace, output: Output) -> int:
+    addresses = [parse_address(text) for text in arguments.address]
+    async with connected(arguments, output) as connection:
+        target = _target(connection, arguments.target)
+        for address in addresses:
+            check_read(target.entry(address))
+        started = time.monotonic()
+        report = await read_device(
+            connection.driver(target),
+            target,
+            addresses or readable(target.description),
+            lambda one, done, total: output.progress("cli.reading", device=one.slug, done=done, total=total),
+        )
+    if output.as_json:
+        values = {str(address): _json_value(target, address, raw) for address, raw in report.values.items()}
+        failed = {str(address): error.code for address, error in report.failed.items()}
+        output.result({"device": target.slug, "values": values, "failed": failed}, "")
+    else:
+        rows = [_value_row(target, target.entry(address), raw, output) for address, raw in report.values.items()]
+        output.table(("ADDRESS", "NAME", "VALUE", "UNIT", "RAW"), rows)
+    for address, error in report.failed.items():
+        name = target.entry(address).title
+        output.say("cli.unread", address=address.short, name=name, reason=error_text(output.texts, error))
+    took = f"{time.monotonic() - started:.2f}"
+    output.say("cli.read_done", device=target.slug, count=len(report.values), took_s=took)
+    return next((error.exit_code for error in report.failed.values()), 0) if addresses else 0
+
+
+def _value_row(target: Target, entry: Entry, raw: Raw, output: Output) -> tuple[str, ...]:
+    scaled = to_scaled(entry, raw, target.lookup)
+    text = show(entry, raw, target.lookup)
+    if entry.enumeration is not None and isinstance(raw, int):
+        named = target.description.enumerations[entry.enumeration].by_value(raw)
+        text = f"{text} {output.texts(named.text_key)}" if named else text
+    unit = scaled.unit if scaled is not None else ""
+    return (
+        str(entry.address),
+        output.texts.name(entry.title),
+        text,
+        unit,
+        raw.hex() if isinstance(raw, bytes) else str(raw),
+    )
+
+
+def _json_value(target: Target, address: Any, raw: Raw) -> dict[str, Any]:
+    entry = target.entry(address)
+    scaled = to_scaled(entry, raw, target.lookup)
+    return {
+        "name": entry.title,
+        "raw": {"hex": raw.hex()} if isinstance(raw, bytes) else raw,
+        "scaled": None if scaled is None else float(scaled.number),
+        "unit": None if scaled is None else scaled.unit,
+    }
+
+
+async def _write(arguments: argparse.Namespace, output: Output) -> int:
+    address = parse_address(arguments.address)
+    async with connected(arguments, output) as connection:
+        target = _target(connection, arguments.target)
+        entry = target.entry(address)
+        driver = connection.driver(target)
+        result = await write_text(
+            driver, target, address, arguments.value, connection.journal, factory=arguments.factory
+        )
+        was = "–" if result.was is None else show(entry, result.was, target.lookup)
+        now = show(entry, result.sent if result.read is None else result.read, target.lookup)
+        output.result(
+            {
+                "device": target.slug,
+                "address": str(address),
+                "was": result.was,
+                "now": result.read,
+                "verified": result.verified,
+            },
+            output.texts("cli.written", device=target.slug, address=address.short, name=entry.title, was=was, now=now),
+        )
+        if arguments.save:
+            await _save_one(connection, target, output)
+    return 0
+
+
+async def _save(arguments: argparse.Namespace, output: Output) -> int:
+    async with connected(arguments, output) as connection:
+        await _save_one(connection, _target(connection, arguments.target), output)
+    return 0
+
+
+async def _save_one(connection: Connection, target: Target, output: Output) -> None:
+    took = await save(connection.driver(target), target, connection.journal, connection.stamper)
+    text = output.texts("cli.save_done", device=target.slug, took_s=f"{took.took_s:.2f}")
+    output.result({"device": target.slug, "saved": True, "took_s": took.took_s}, text)
+
+
+async def _restart(arguments: argparse.Namespace, output: Output) -> int:
+    async with connected(arguments, output) as connection:
+        target = _target(connection, arguments.target)
+        took = await restart(connection.driver(target), target, connection.journal, connection.stamper)
+        text = output.texts("cli.restart_done", device=target.slug, took_s=f"{took.took_s:.2f}")
+        output.result({"device": target.slug, "took_s": took.took_s}, text)
+    return 0
+
+
+async def _backup(arguments: argparse.Namespace, output: Output) -> int:
+    settings = arguments.settings
+    async with connected(arguments, output) as connection:
+        targets = [_target(connection, one) for one in arguments.target] or list(connection.targets)
+        if not targets:
+            raise UsageError(reason="no device with a known description was found")
+        started = time.monotonic()
+        reports = await read_devices(
+            [(connection.driver(target), target) for target in targets],
+            lambda one, done, total: output.progress("cli.reading", device=one.slug, done=done, total=total),
+        )
+        took = f"{time.monotonic() - started:.2f}"
+    code = 0
+    for report in reports:
+        target = report.target
+        if not report.values:
+            output.error(next(iter(report.failed.values())))
+            code = 5
+            continue
+        parameters = to_set(report, connection.turbine.slug, settings.person, arguments.reason, time.time_ns())
+        path = write_set(settings.sets / connection.turbine.slug, parameters)
+        for address, error in report.failed.items():
+            reason = error_text(output.texts, error)
+            output.say(
+                "cli.unread", address=f"{target.slug} {address.short}", name=target.entry(address).title, reason=reason
+            )
+        details = {
+            "file": str(path),
+            "count": len(report.values),
+            "unread": len(report.failed),
+            "hash": parameters.hash,
+        }
+        short = details | {"hash": parameters.hash[:12]}
+        output.result({"device": target.slug, **details}, output.texts("cli.set_written", **short))
+        output.say("cli.read_done", device=target.slug, count=len(report.values), took_s=took)
+    return code
+
+
+async def _record(arguments: argparse.Namespace, output: Output) -> int:
+    turbine = site_turbine(arguments) or bare_turbine(arguments.can)
+    stop = asyncio.Event()
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        with contextlib.suppress(NotImplementedError):  # Windows: Ctrl-C comes as KeyboardInterrupt
+            loop.add_signal_handler(number, stop.set)
+    connection = _connection(arguments, turbine, True)
+    try:
+        async with connection:
+            output.say("cli.stop_hint")
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(_show_recording(connection, output, stop), arguments.seconds)
+    finally:
+        status = None if connection.recording is None else connection.recording.status()
+    if status is None:
+        raise HubsideError(reason="no recording")
+    size = f"{status.size_bytes / 1e6:.2f} MB"
+    details = {"file": str(status.file), "frames": status.frames, "size": size, "lost": status.lost}
+    output.result(details, output.texts("cli.recording", **details))
+    return 0
+
+
+async def _show_recording(connection: Connection, output: Output, stop: asyncio.Event) -> None:
+    while not stop.is_set():
+        if connection.recording is not None:
+            status = connection.recording.status()
+            size = f"{status.size_bytes / 1e6:.2f} MB"
+            output.progress("cli.recording", file=status.file, frames=status.frames, size=size, lost=status.lost)
+        with contextlib.suppress(TimeoutError):
+            await asyncio.wait_for(stop.wait(), 0.5)
+
+
+def _target(connection: Connection, name: str) -> Target:
+    return connection.target(find_device(connection.turbine, name).slug)

@@ -1,0 +1,130 @@
+"""One bus of a connection: its driver, and what becomes of every frame that the driver hands over."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from threading import Lock
+from typing import Any, Final, Protocol
+
+from app.drivers.can_config import parse_can
+from app.drivers.contract import DriverStatus, LinkState
+from app.drivers.table import driver_class
+from app.model.address import Address
+from app.model.description import Bus, Description
+from app.model.site import BusConfig
+from app.service.options import Options
+from app.wire.busload import BusLoad
+from app.wire.can_bits import frame_bits
+from app.wire.decoder import CanOpenDecoder
+from app.wire.frame import Can, Frame, Stamper
+from app.wire.live import LiveState
+from app.wire.nmt import NmtState
+from app.wire.pdo_follower import PdoRoute
+from app.wire.records import Source
+
+GAP_REASON: Final = "gap.bus_lost"
+
+
+class FrameSink(Protocol):
+    """Takes every frame in order and never blocks: the recorder."""
+
+    def write(self, frames: Sequence[Frame]) -> None:
+        """Take a batch."""
+
+
+class BusLink:
+    """A CANopen bus: frames go to the recorder, through the decoder into the live state, and count as bus load.
+
+    ``on_frames`` runs on the driver's receive thread; ``lock`` is shared by all buses of a connection, because the live
+    state has one writer at a time.
+    """
+
+    def __init__(
+        self,
+        config: BusConfig,
+        descriptions: Mapping[int, Description],
+        live: LiveState,
+        lock: Lock,
+        stamper: Stamper,
+        options: Options,
+    ) -> None:
+        self.name = config.name
+        with_rate = "@" in config.connection or not config.bitrate
+        can = parse_can(config.connection if with_rate else f"{config.connection}@{config.bitrate}")
+        self.bitrate = can.bitrate
+        self.adapter = config.connection
+        self.decoder = CanOpenDecoder(config.name, descriptions)
+        self.load = BusLoad(self.bitrate)
+        self.frames = 0
+        self.sink: FrameSink | None = None
+        self._live = live
+        self._lock = lock
+        self._state = LinkState.CLOSED
+        self.driver: Any = driver_class(Bus.CANOPEN)(
+            can,
+            stamper,
+            config.name,
+            tuple({one.id: one for one in descriptions.values()}.values()),
+            consent=options.consent,
+            listen_s=options.listen_s,
+        )
+        for node, description in descriptions.items():
+            self.describe(node, description)
+        self.driver.subscribe(self.on_frames)
+
+    def describe(self, node: int, description: Description) -> None:
+        """Tell decoder, live state and driver what stands at ``node``."""
+        with self._lock:
+            self.decoder.set_description(node, description)
+            self._live.set_description(self.name, node, description)
+        self.driver.set_description(node, description)
+
+    def on_frames(self, frames: list[Frame]) -> None:
+        """Record, count, decode."""
+        if self.sink is not None:
+            self.sink.write(frames)
+        with self._lock:
+            self.frames += len(frames)
+            for frame in frames:
+                can = frame.payload
+                if isinstance(can, Can):
+                    self.load.feed(frame.t_ns, frame_bits(can), can.can_id, can.extended)
+                records = self.decoder.feed(frame)
+                if records:
+                    self._live.apply_all(records)
+
+    def gap(self, t_ns: int) -> None:
+        """Frames are missing before ``t_ns``: what was read until then proves nothing any more."""
+        with self._lock:
+            self._live.apply_all(self.decoder.gap(t_ns, GAP_REASON))
+
+    def bus_load(self, now_ns: int) -> float:
+        """Load of the last second, 0..1."""
+        with self._lock:
+            return self.load.load(now_ns)
+
+    @property
+    def status(self) -> DriverStatus:
+        """State of the link."""
+        status: DriverStatus = self.driver.status
+        return status
+
+    def pdos(self, node: int) -> tuple[PdoRoute, ...]:
+        """The PDOs of ``node`` by the mapping in force."""
+        with self._lock:
+            return self.decoder.pdos(node)
+
+    def send_pdo(self, node: int, address: Address, data: bytes) -> bool:
+        """Send ``data`` by the receive PDO of ``node`` that carries ``address`` and nothing else.
+
+        False where the node is not operational or no such PDO is in force: then nothing was sent. Raises BusLostError.
+        """
+        view = self._live.node(self.name, node)
+        if view is None or view.state is not NmtState.OPERATIONAL or view.silent:
+            return False
+        for route in self.pdos(node):
+            entries = route.mapping.entries
+            if route.source is Source.PDO_RX and len(entries) == 1 and entries[0] == (address, 8 * len(data)):
+                self.driver.send_raw(Can(route.can_id, data, route.extended))
+                return True
+        return False

@@ -1,0 +1,173 @@
+"""A connected turbine: its buses, the live state that their frames make, the journal and the recording."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Callable, Iterable, Mapping
+from threading import Lock
+from typing import Any, Final
+
+from app.drivers.contract import DriverStatus, LinkState, MasterSign
+from app.errors import UsageError
+from app.model.description import Description
+from app.model.site import Device, Turbine
+from app.recording.content import RecorderClock
+from app.service.bus_link import BusLink
+from app.service.devices import Target
+from app.service.journal import Journal, Kind
+from app.service.options import Options
+from app.service.recording import Recording, Subject
+from app.service.stop import CONTROLWORD, Axis, is_axis
+from app.wire.frame import Stamper
+from app.wire.live import LiveState
+
+TICK_S: Final = 0.1
+
+
+class Connection:
+    """From ``open`` to ``close``. Use cases take a driver and a target from here; screens read ``live``.
+
+    ``descriptions`` by id must hold every description that the turbine's devices name.
+    """
+
+    def __init__(
+        self,
+        turbine: Turbine,
+        descriptions: Mapping[str, Description],
+        options: Options,
+        wall_ns: Callable[[], int] = time.time_ns,
+        monotonic_ns: Callable[[], int] = time.monotonic_ns,
+    ) -> None:
+        self.turbine = turbine
+        self.live = LiveState()
+        self.stamper = Stamper(wall_ns(), monotonic_ns)
+        self.journal = Journal(self.stamper, options.person)
+        self._options = options
+        self._clock = RecorderClock(monotonic_ns, wall_ns, self.stamper)
+        self._targets = {device.slug: self._target(device, descriptions) for device in turbine.devices}
+        self._lock = Lock()
+        self.buses = {
+            bus.name: BusLink(bus, self._by_node(bus.name), self.live, self._lock, self.stamper, options)
+            for bus in turbine.buses
+        }
+        self.recording: Recording | None = None
+        self._states: dict[str, DriverStatus] = {}
+        self._masters: set[tuple[str, MasterSign]] = set()
+        self._watcher: asyncio.Task[None] | None = None
+
+    # -- the link -------------------------------------------------------------
+
+    async def open(self, timeout_s: float = 5.0) -> None:
+        """Start recording, then open every bus and listen. Raises BusOpenError; then nothing is left open."""
+        try:
+            if self._options.recordings is not None:
+                self.recording = Recording(self._options.recordings, self._subject(), self.journal, self._clock)
+                for link in self.buses.values():
+                    link.sink = self.recording.recorder
+            await asyncio.gather(*(link.driver.connect(timeout_s) for link in self.buses.values()))
+        except BaseException:
+            await self.close()
+            raise
+        self._watch(self.stamper())
+        self._watcher = asyncio.create_task(self._watch_forever())
+
+    async def close(self) -> None:
+        """Close every bus, then the recording."""
+        if self._watcher is not None:
+            self._watcher.cancel()
+            await asyncio.gather(self._watcher, return_exceptions=True)
+            self._watcher = None
+        await asyncio.gather(*(link.driver.close() for link in self.buses.values()))
+        if self.recording is not None:
+            await asyncio.to_thread(self.recording.stop)
+
+    async def __aenter__(self) -> Connection:
+        await self.open()
+        return self
+
+    async def __aexit__(self, *_exc: object) -> None:
+        await self.close()
+
+    # -- devices ----------------------------------------------------------------
+
+    def target(self, slug: str) -> Target:
+        """The device with this slug. Raises UsageError."""
+        found = self._targets.get(slug)
+        if found is None:
+            raise UsageError(reason=f"no device '{slug}'")
+        return found
+
+    @property
+    def targets(self) -> Iterable[Target]:
+        """All devices, station by station."""
+        return self._targets.values()
+
+    def driver(self, target: Target) -> Any:
+        """The driver of the device's bus."""
+        return self.buses[target.device.bus].driver
+
+    def axes(self) -> list[Axis]:
+        """Every axis, and how its controlword is reached."""
+        return [self._axis(target) for target in self._targets.values() if is_axis(target)]
+
+    def _axis(self, target: Target) -> Axis:
+        link = self.buses[target.device.bus]
+        return Axis(link.driver, target, lambda data: link.send_pdo(target.node, CONTROLWORD, data))
+
+    def _target(self, device: Device, descriptions: Mapping[str, Description]) -> Target:
+        description = descriptions.get(device.description_id)
+        if description is None:
+            raise UsageError(reason=f"{device.slug}: no description '{device.description_id}'")
+        return Target(device, description, self.live)
+
+    def _by_node(self, bus: str) -> dict[int, Description]:
+        return {t.node: t.description for t in self._targets.values() if t.device.bus == bus}
+
+    # -- watching -----------------------------------------------------------------
+
+    async def _watch_forever(self) -> None:
+        while True:
+            now_ns = self.stamper()
+            self._watch(now_ns)
+            with self._lock:
+                self.live.tick(now_ns)
+            if self.recording is not None:
+                self.recording.watch(self.keyframe)
+            await asyncio.sleep(TICK_S)
+
+    def keyframe(self) -> tuple[int, dict[str, Any]]:
+        """All that a reader needs to go on from a time: live state and what the decoders know of open transfers."""
+        with self._lock:
+            return self.live.t_ns, {
+                "live": self.live.snapshot(),
+                "decoders": {name: link.decoder.snapshot() for name, link in self.buses.items()},
+            }
+
+    def _subject(self) -> Subject:
+        return Subject(
+            turbine=self.turbine.slug,
+            person=self._options.person,
+            bit_rates={name: link.bitrate for name, link in self.buses.items()},
+            nodes={f"{t.device.bus}/{t.node}": f"{t.slug} {t.description.id}" for t in self._targets.values()},
+            descriptions={t.description.id: t.description for t in self._targets.values()}.values(),
+        )
+
+    def _watch(self, now_ns: int) -> None:
+        for name, link in self.buses.items():
+            status = link.status
+            before = self._states.get(name)
+            self._states[name] = status
+            was_up = before is not None and before.state in (LinkState.CONNECTED, LinkState.LISTENING)
+            if status.state is LinkState.CONNECTED and before is None:
+                self.journal.note(Kind.CONNECTED, None, bus=name, adapter=link.adapter)
+            elif status.state is LinkState.LOST and was_up:
+                link.gap(now_ns)
+                self.journal.note(Kind.BUS_LOST, None, bus=name, reason=status.reason)
+            elif before is not None and status.reconnects > before.reconnects:
+                link.gap(now_ns)
+                self.journal.note(Kind.BUS_BACK, None, bus=name, gap_s=f"{(status.t_ns - before.t_ns) / 1e9:.1f}")
+            for master in status.masters:
+                if (name, master.sign) not in self._masters:
+                    self._masters.add((name, master.sign))
+                    self.journal.note(Kind.OTHER_MASTER, None, bus=name, seen=f"{master.sign.value} {master.can_id:X}h")

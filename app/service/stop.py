@@ -1,0 +1,100 @@
+"""STOP and FEATHER: to every axis of the live connection, on the shortest path there is.
+
+Where the node is operational and an RPDO carries the controlword alone, one frame does it. Otherwise our running
+transfer to that node is aborted and 6040h is written by SDO, ahead of everything that waits. No lock, lease, consent or
+error of another axis holds them back. This is not a safety function.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from enum import Enum
+from typing import Final
+
+from app.drivers.contract import Driver
+from app.errors import HubsideError
+from app.model.address import Address
+from app.model.description import Verify
+from app.service.devices import Target, decode
+from app.service.journal import Journal, Kind
+
+CONTROLWORD: Final = Address(0x6040)
+STATUSWORD: Final = Address(0x6041)
+
+
+class Command(Enum):
+    """What is sent; the value is the controlword (CiA 402 quick stop; EFC is bit 11 of the maker)."""
+
+    STOP = 0x010B
+    FEATHER = 0x080F
+
+
+class Path(Enum):
+    """Which way the controlword went."""
+
+    RPDO = "rpdo"
+    SDO = "sdo"
+    FAILED = "failed"
+
+
+@dataclass(frozen=True, slots=True)
+class AxisOutcome:
+    """What became of the command at one axis. ``confirmed`` once its statusword says that it obeys."""
+
+    device: str
+    how: Path
+    sent_t_ns: int
+    confirmed_t_ns: int | None
+    error: HubsideError | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Axis:
+    """An axis and how it is reached. ``by_rpdo`` sends the controlword as a PDO, or says False where it cannot."""
+
+    driver: Driver
+    target: Target
+    by_rpdo: Callable[[bytes], bool]
+
+
+async def command_all(
+    axes: Iterable[Axis], command: Command, journal: Journal, now_ns: Callable[[], int]
+) -> list[AxisOutcome]:
+    """Send ``command`` to all axes at once. Never raises for one axis' sake."""
+    outcomes = await asyncio.gather(*(_command(axis, command, now_ns) for axis in axes))
+    kind = Kind.STOP_SENT if command is Command.STOP else Kind.FEATHER_SENT
+    sent = [outcome for outcome in outcomes if outcome.how is not Path.FAILED]
+    journal.note(kind, None, count=len(sent), failed=len(outcomes) - len(sent))
+    return list(outcomes)
+
+
+def is_axis(target: Target) -> bool:
+    """True for a device that has a controlword of CiA 402."""
+    return CONTROLWORD in target.description.entries and STATUSWORD in target.description.entries
+
+
+async def _command(axis: Axis, command: Command, now_ns: Callable[[], int]) -> AxisOutcome:
+    driver, target = axis.driver, axis.target
+    data = command.value.to_bytes(2, "little")
+    sent_t_ns = now_ns()
+    try:
+        if axis.by_rpdo(data):
+            how = Path.RPDO
+        else:
+            await driver.write(target.node, CONTROLWORD, data, verify=Verify.ACK, urgent=True)
+            how = Path.SDO
+        confirmed = await _confirmed(driver, target, command)
+    except HubsideError as error:
+        return AxisOutcome(target.slug, Path.FAILED, sent_t_ns, None, error)
+    return AxisOutcome(target.slug, how, sent_t_ns, now_ns() if confirmed else None)
+
+
+async def _confirmed(driver: Driver, target: Target, command: Command) -> bool:
+    """The statusword says that the axis obeys: it has left operation enabled (STOP), or drives there (FEATHER)."""
+    raw = decode(target.entry(STATUSWORD), await driver.read(target.node, STATUSWORD))
+    if not isinstance(raw, int):
+        return False
+    enabled = raw & 0x6F == 0x27  # operation enabled (CiA 402, table 29)
+    return enabled if command is Command.FEATHER else not enabled
