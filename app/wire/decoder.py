@@ -119,7 +119,7 @@ class CanOpenDecoder:
         return (*records, GapSeen(t_ns, self.bus, 0, reason))
 
     def pdos(self, node: int) -> tuple[PdoRoute, ...]:
-        """The valid PDOs of ``node`` whose mapping is known, by the mapping in force. Raises KeyError outside 1..127."""
+        """The valid PDOs of ``node`` whose mapping is known, as in force now. Raises KeyError outside 1..127."""
         return self._nodes[node].layout.pdos
 
     # -- routes ----------------------------------------------------------------

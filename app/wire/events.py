@@ -53,8 +53,8 @@ class Severity(Enum):
 class Event(NamedTuple):
     """One event; ``version`` is that of the live state when it came in or was last repeated.
 
-    ``details`` are JSON-able and fill the placeholders of the text; those ending in ``_key`` are text keys themselves.
-    ``repeats`` counts like events in a row that were folded into this one.
+    ``details`` are JSON-able and fill the placeholders of the text. One named ``x_key`` is itself a text key: its text
+    fills the placeholder ``x``. ``repeats`` counts like events in a row that were folded into this one.
     """
 
     version: int
@@ -133,6 +133,7 @@ def tell_sdo(seen: SdoSeen) -> Told | None:
     if seen.outcome is Outcome.ABORTED and seen.abort_code is not None and seen.aborted_by is not None:
         details |= {
             "abort_code": seen.abort_code,
+            "abort_code_hex": f"{seen.abort_code:08X}h",
             "reason_key": abort_text_key(seen.abort_code),
             "aborted_by": seen.aborted_by.value,
         }
@@ -148,7 +149,13 @@ def tell_emcy(seen: EmcySeen, description: Description | None) -> Told:
     """An emergency in the words of the device where it is described, else of the standard's error classes."""
     known = None if description is None else description.errors.get(seen.code)
     reason_key = emcy_text_key(seen.code) if known is None else known.text_key
-    details = {"code": seen.code, "register": seen.register, "data": seen.data.hex(), "reason_key": reason_key}
+    details = {
+        "code": seen.code,
+        "code_hex": f"{seen.code:04X}h",
+        "register": seen.register,
+        "data": seen.data.hex(),
+        "reason_key": reason_key,
+    }
     if seen.code == NO_ERROR:
         return Told(EventKind.EMCY_RESET, Severity.INFO, EventKind.EMCY_RESET.text_key, details)
     return Told(EventKind.EMCY, Severity.ERROR, EventKind.EMCY.text_key, details)

@@ -441,7 +441,7 @@ class LiveState:
 
     def _on_malformed(self, seen: MalformedSeen) -> None:
         kind = EventKind.MALFORMED
-        details = {"can_id": seen.can_id, "fault_key": seen.fault.text_key, "data": seen.data.hex()}
+        details = {"can_id_hex": f"{seen.can_id:X}h", "fault_key": seen.fault.text_key, "data": seen.data.hex()}
         self._add_event(seen.t_ns, seen.bus, seen.node, Told(kind, Severity.WARNING, kind.text_key, details))
 
     # -- bookkeeping -------------------------------------------------------------
