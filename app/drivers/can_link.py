@@ -1,7 +1,7 @@
 """An open CAN adapter, whatever it is: frames in bulk, one frame out, and its end.
 
-``open_link`` makes the one for a ``CanConfig``. Every error of python-can or of the system becomes ``LinkError`` here:
-the link is then of no more use, except after ``LinkBusyError``.
+``app.drivers.can_open`` makes the one for a ``CanConfig``. Every error of python-can or of the system becomes
+``LinkError`` here: the link is of no more use then; after ``LinkBusyError`` it still is.
 """
 
 from __future__ import annotations
@@ -22,8 +22,6 @@ from app.wire.frame import Can
 _LOG: Final = logging.getLogger(__name__)
 _BATCH: Final = 256
 _POSIX: Final = os.name == "posix"
-_SLCAN_SETTLE_S: Final = 0.1
-"""python-can waits 2 s for boards that restart when opened; adapters for CAN do not."""
 
 
 class LinkError(Exception):

@@ -35,6 +35,11 @@ def open_link(config: CanConfig, timeout_s: float) -> CanLink:
             arguments = {"sleep_after_open": _SLCAN_SETTLE_S, "timeout": _SLCAN_READ_S} | arguments
         if config.interface is CanInterface.PCAN and config.listen_only:
             arguments["state"] = can.BusState.PASSIVE
-        return _LINKS.get(config.interface, PythonCanLink)(can.Bus(ignore_config=True, **arguments))
+        bus = can.Bus(ignore_config=True, **arguments)
+        try:
+            return _LINKS.get(config.interface, PythonCanLink)(bus)
+        except Exception:
+            bus.shutdown()
+            raise
     except Exception as error:
         raise LinkError(error_text(error)) from error

@@ -10,6 +10,7 @@ client to server                          server to client
 ``< rawmode >``                           ``< ok >``; from then on every frame of the others:
                                           ``< frame ID SECONDS.MICROSECONDS DATA >``
                                           ``< rtr ID SECONDS.MICROSECONDS DLC >``
+                                          ``< error CLASS SECONDS.MICROSECONDS >``
 ``< send ID DLC B0 B1 ... >``             nothing
 ``< sendrtr ID DLC >``                    nothing
 ``< echo >``                              ``< echo >``
@@ -50,6 +51,7 @@ _SYSTEM_BUFFER_BYTES: Final = 1 << 17
 _PENDING_LIMIT: Final = 512
 """Frames of one client that wait for the line before nothing more is read from it."""
 _RESUME_NS: Final = 10_000_000
+_CLIENTS_MAX: Final = 64
 
 
 class _Mode(Enum):
@@ -130,6 +132,10 @@ class SocketcandServer:
     def _accept(self) -> None:
         with contextlib.suppress(BlockingIOError, ConnectionAbortedError):
             sock, peer = self._listener.accept()
+            if len(self._clients) >= _CLIENTS_MAX:
+                _LOG.warning("socketcand client %s refused: there are %d already", peer[0], len(self._clients))
+                sock.close()
+                return
             sock.setblocking(False)
             sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SYSTEM_BUFFER_BYTES)
@@ -297,6 +303,8 @@ def frame_element(can: Can, wall_ns: int) -> bytes:
     """The element that tells a client of ``can``."""
     can_id = f"{can.can_id:08X}" if can.extended else f"{can.can_id:03X}"
     seconds, micros = divmod(wall_ns // 1000, 1_000_000)
+    if can.error:
+        return f"< error {can_id} {seconds}.{micros:06d} >".encode()
     if can.remote:
         return f"< rtr {can_id} {seconds}.{micros:06d} {can.length} >".encode()
     return f"< frame {can_id} {seconds}.{micros:06d} {can.data.hex().upper()} >".encode()

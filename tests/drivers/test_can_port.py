@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import os
 import select
+import socket
 import struct
 import sys
 import threading
@@ -316,6 +317,52 @@ def test_socketcan_frames_as_the_kernel_gives_them() -> None:
     assert parse(kernel(0x40000701, 1, b"")) == Can(0x701, remote=True, dlc=1)
     assert parse(kernel(0xC0000701, 8, b"")) == Can(0x701, extended=True, remote=True, dlc=8)
     assert parse(kernel(0x20000004, 8, bytes(8))) == Can(4, bytes(8), error=True)
+
+
+class DatagramBus(can.BusABC):
+    """Frames as the kernel gives them, over UDP: its sockets know the time stamps and drop counts of SocketCAN's."""
+
+    def __init__(self) -> None:
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.bind(("127.0.0.1", 0))
+        self.socket.setsockopt(socket.SOL_SOCKET, 35, 1)
+        super().__init__("datagram")
+
+    def send(self, msg: can.Message, timeout: float | None = None) -> None:
+        raise NotImplementedError
+
+    def fileno(self) -> int:
+        return self.socket.fileno()
+
+    def shutdown(self) -> None:
+        super().shutdown()
+        self.socket.close()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="socket options of Linux")
+def test_socketcan_drops_are_counted() -> None:
+    bus = DatagramBus()
+    link = SocketcanLink(bus)
+    with closing(link), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        sender.connect(bus.socket.getsockname())
+        frame = struct.pack("=IB3x8s", 0x181, 1, b"\x07")
+        sender.send(frame)
+        ((received, t_ns),) = link.recv_many(0)
+        assert received == Can(0x181, b"\x07")
+        assert t_ns is not None
+        assert abs(t_ns - time.time_ns()) < 5_000_000_000
+        assert link.dropped == 0
+        sent = 0
+        for _ in range(40_000):
+            sender.send(frame)
+            sent += 1
+        read = 0
+        while batch := link.recv_many(0):
+            read += len(batch)
+        sender.send(frame)
+        assert len(link.recv_many(0)) == 1
+        assert link.dropped == sent - read > 0
+        assert read > 5000
 
 
 def test_slcan_lines_both_ways() -> None:

@@ -7,7 +7,7 @@ import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import closing
+from contextlib import ExitStack, closing
 
 import can
 import pytest
@@ -172,6 +172,7 @@ def test_commands_split_and_joined_anyhow(bench: Bench) -> None:
 def test_remote_and_empty_frames_in_text(bench: Bench) -> None:
     assert frame_element(Can(0x80), 1_700_000_000_000_001_999) == b"< frame 080 1700000000.000001  >"
     assert frame_element(Can(0x1, b"\xab", extended=True), 10**9) == b"< frame 00000001 1.000000 AB >"
+    assert frame_element(Can(0x4, error=True), 10**9) == b"< error 004 1.000000 >"
     with closing(raw(bench)) as sock:
         bench.send(Can(0x701, remote=True, dlc=1))
         (element,) = elements(sock, 1)
@@ -218,6 +219,14 @@ def test_a_client_that_does_not_read_is_dropped_and_others_are_not(
             got += len(elements(good, 200))
         assert got > 0
     assert "does not read" in caplog.text
+
+
+def test_there_is_a_limit_of_clients(bench: Bench) -> None:
+    with ExitStack() as stack:
+        address = (bench.server.host, bench.server.port)
+        clients = [stack.enter_context(closing(socket.create_connection(address, timeout=5))) for _ in range(65)]
+        assert [client.recv(6) for client in clients[:64]] == [b"< hi >"] * 64
+        assert clients[64].recv(6) == b""
 
 
 def test_disconnect_leaves_the_line(bench: Bench) -> None:
