@@ -1,0 +1,68 @@
+import type { Job, ProblemDoc, Raw, RestartResult, SaveResult, StopResult, WriteResult } from "./types";
+
+/** A request that the server or the device refused, with all that it said. */
+export class Problem extends Error {
+  readonly doc: ProblemDoc;
+
+  constructor(doc: ProblemDoc) {
+    super(doc.title);
+    this.doc = doc;
+  }
+}
+
+/** The server did not answer at all. */
+export class Unreachable extends Error {}
+
+async function request<T>(path: string, init: RequestInit): Promise<T> {
+  let response: Response;
+  try {
+    response = await fetch(path, { credentials: "same-origin", ...init });
+  } catch (cause) {
+    throw new Unreachable(path, { cause });
+  }
+  if (!response.ok) throw new Problem(await problemOf(response));
+  return (await response.json()) as T;
+}
+
+async function problemOf(response: Response): Promise<ProblemDoc> {
+  const plain: ProblemDoc = {
+    type: "about:blank",
+    title: response.statusText,
+    status: response.status,
+    code: `http_${response.status}`,
+    text_key: "page.error.http",
+    details: { status: response.status },
+    device_state: null,
+  };
+  if (!response.headers.get("content-type")?.includes("json")) return plain;
+  try {
+    const doc = (await response.json()) as Partial<ProblemDoc>;
+    return { ...plain, ...doc, details: doc.details ?? plain.details };
+  } catch {
+    return plain;
+  }
+}
+
+export function get<T>(path: string, signal?: AbortSignal): Promise<T> {
+  return request<T>(path, { method: "GET", ...(signal ? { signal } : {}) });
+}
+
+function post<T>(path: string, body: object): Promise<T> {
+  return request<T>(path, {
+    method: "POST",
+    headers: { "content-type": "application/json" },
+    body: JSON.stringify(body),
+  });
+}
+
+const device = (slug: string) => `/api/live/devices/${slug}`;
+
+export const commands = {
+  read: (slug: string, addresses: string[] | null) => post<Job>(`${device(slug)}/read`, { addresses }),
+  write: (slug: string, address: string, raw: Raw) => post<WriteResult>(`${device(slug)}/write`, { address, raw }),
+  save: (slug: string) => post<SaveResult>(`${device(slug)}/save`, {}),
+  restart: (slug: string) => post<RestartResult>(`${device(slug)}/restart`, {}),
+  stop: () => post<StopResult>("/api/live/stop", {}),
+  feather: () => post<StopResult>("/api/live/feather", {}),
+  cancel: (id: string) => request<Job>(`/api/live/jobs/${id}`, { method: "DELETE" }),
+};

@@ -1,0 +1,114 @@
+import { TextInput } from "@mantine/core";
+import {
+  IconAlertOctagon,
+  IconAlertTriangle,
+  IconChevronDown,
+  IconChevronUp,
+  IconInfoCircle,
+} from "@tabler/icons-react";
+import { useState } from "react";
+import type { EventData } from "../api/types";
+import { useEvents } from "../live/live";
+import type { NumberedEvent } from "../live/store";
+import { type Translate, useTexts } from "../texts/texts";
+import { lastOf, timeOfDay } from "../ui/format";
+import classes from "./Frame.module.css";
+import { usePageSearch } from "./search";
+
+const SEVERITY_ICONS = { info: IconInfoCircle, warning: IconAlertTriangle, error: IconAlertOctagon };
+const SEVERITY_TONES = { info: "dim", warning: "tone-warning", error: "tone-error" };
+
+const textOf = (event: EventData, t: Translate) => t(event.text_key, event.details);
+const deviceOf = (event: EventData) => (event.device === null ? "–" : lastOf(event.device));
+
+/** What happened, newest first; closed it still shows the newest. */
+export function EventDrawer() {
+  const t = useTexts();
+  const events = useEvents();
+  const [search, update] = usePageSearch();
+  const open = search.events === "open";
+  const latest = events[0];
+  return (
+    <section className={classes.events} aria-label={t("page.events.label")}>
+      <button
+        type="button"
+        className={classes.eventBar}
+        aria-expanded={open}
+        data-testid="events-toggle"
+        onClick={() => update({ events: open ? undefined : "open" })}
+      >
+        {open ? <IconChevronDown size={18} aria-hidden /> : <IconChevronUp size={18} aria-hidden />}
+        <strong>{t("page.events.title", { count: events.length })}</strong>
+        {!open && latest && (
+          <span className={`${classes.eventLatest} bench`}>
+            <span className="dim">{timeOfDay(latest.t_ns / 1e6)}</span>
+            <Severity severity={latest.severity} />
+            <span className="dim">{deviceOf(latest)}</span>
+            <span className={classes.ellipsis}>{textOf(latest, t)}</span>
+          </span>
+        )}
+      </button>
+      {open && <EventTable events={events} />}
+    </section>
+  );
+}
+
+function Severity({ severity }: { severity: EventData["severity"] }) {
+  const t = useTexts();
+  const Icon = SEVERITY_ICONS[severity];
+  return (
+    <span className={`${classes.severity} ${SEVERITY_TONES[severity]}`}>
+      <Icon size={15} aria-hidden />
+      {t(`page.severity.${severity}`)}
+    </span>
+  );
+}
+
+function EventTable({ events }: { events: readonly NumberedEvent[] }) {
+  const t = useTexts();
+  const [filter, setFilter] = useState("");
+  const wanted = filter.trim().toLowerCase();
+  const shown = events
+    .map((event) => ({ event, text: textOf(event, t), device: deviceOf(event) }))
+    .filter((line) => `${line.text} ${line.device}`.toLowerCase().includes(wanted));
+  return (
+    <div className={`${classes.eventBody} bench`}>
+      <table className={classes.eventTable}>
+        <thead>
+          <tr>
+            <th className={classes.eventTime}>{t("page.events.time")}</th>
+            <th className={classes.eventSeverity}>{t("page.events.severity")}</th>
+            <th className={classes.eventDevice}>{t("page.events.device")}</th>
+            <th>
+              <TextInput
+                placeholder={t("page.events.filter")}
+                aria-label={t("page.events.filter")}
+                value={filter}
+                onChange={(event) => setFilter(event.currentTarget.value)}
+              />
+            </th>
+          </tr>
+        </thead>
+        <tbody>
+          {shown.map(({ event, text, device }) => (
+            <tr key={event.id}>
+              <td>{timeOfDay(event.t_ns / 1e6)}</td>
+              <td>
+                <Severity severity={event.severity} />
+              </td>
+              <td>{device}</td>
+              <td>{text}</td>
+            </tr>
+          ))}
+          {shown.length === 0 && (
+            <tr>
+              <td colSpan={4} className="dim">
+                {t(events.length === 0 ? "page.events.none" : "page.events.none_match")}
+              </td>
+            </tr>
+          )}
+        </tbody>
+      </table>
+    </div>
+  );
+}

@@ -1,0 +1,34 @@
+import { Outlet, useRouterState } from "@tanstack/react-router";
+import { Suspense } from "react";
+import { useHearing, useLink } from "../live/live";
+import { Notices } from "../ui/Notices";
+import { DeafBanner } from "./DeafBanner";
+import { EventDrawer } from "./EventDrawer";
+import classes from "./Frame.module.css";
+import { Navigation } from "./Navigation";
+import { SceneDock } from "./SceneDock";
+import { TopBar } from "./TopBar";
+import { useEscapeStops } from "./stop";
+
+/** The frame of every page: who we are connected to above, rooms left, 3D right, events below. */
+export function Frame() {
+  const deaf = useHearing().state !== "hearing";
+  const mode = useLink()?.mode ?? "none";
+  const path = useRouterState({ select: (state) => state.location.pathname });
+  useEscapeStops();
+  return (
+    <div className={classes.frame} data-deaf={deaf} data-mode={mode} data-page={path}>
+      <TopBar />
+      <DeafBanner />
+      <Navigation />
+      <main className={classes.main}>
+        <Suspense>
+          <Outlet />
+        </Suspense>
+      </main>
+      <SceneDock />
+      <EventDrawer />
+      <Notices />
+    </div>
+  );
+}

@@ -1,0 +1,63 @@
+import { Center, Loader, MantineProvider } from "@mantine/core";
+import { useQuery } from "@tanstack/react-query";
+import { useEffect, useMemo } from "react";
+import { Problem } from "../api/client";
+import { sessionQuery, textsQuery } from "../api/queries";
+import type { Language } from "../api/types";
+import { startLive } from "../live/live";
+import { bootTranslator, TextsContext, translator } from "../texts/texts";
+import { Frame } from "./Frame";
+import { NoAccess } from "./NoAccess";
+import { type Theme, usePageSearch } from "./search";
+import { theme as mantineTheme } from "./theme";
+
+const UNAUTHORISED = 401;
+const RETRY_MS = 2000;
+
+/** Everything around the frame: colours, access, language and texts. */
+export function Shell() {
+  const [search] = usePageSearch();
+  const scheme: Theme = search.theme ?? systemTheme();
+  return (
+    <MantineProvider theme={mantineTheme} forceColorScheme={scheme}>
+      <Gate wanted={search.lang} />
+    </MantineProvider>
+  );
+}
+
+function Gate({ wanted }: { wanted: Language | undefined }) {
+  const session = useQuery({ ...sessionQuery, refetchInterval: (query) => (query.state.data ? false : RETRY_MS) });
+  const language = wanted ?? session.data?.locale ?? browserLanguage();
+  const texts = useQuery({ ...textsQuery(language), enabled: session.isSuccess, placeholderData: (before) => before });
+  const t = useMemo(() => translator(texts.data ?? {}, language), [texts.data, language]);
+  useEffect(() => {
+    document.documentElement.lang = language;
+  }, [language]);
+  useEffect(() => {
+    if (session.isSuccess) startLive();
+  }, [session.isSuccess]);
+
+  if (session.isSuccess && texts.data) {
+    return (
+      <TextsContext value={t}>
+        <Frame />
+      </TextsContext>
+    );
+  }
+  const boot = bootTranslator(language);
+  if (session.error instanceof Problem && session.error.doc.status === UNAUTHORISED) return <NoAccess t={boot} />;
+  if (session.error ?? texts.error) return <NoAccess t={boot} unreachable />;
+  return (
+    <Center h="100%">
+      <Loader aria-label={boot("page.boot.loading")} />
+    </Center>
+  );
+}
+
+function browserLanguage(): Language {
+  return navigator.language.startsWith("de") ? "de" : "en";
+}
+
+function systemTheme(): Theme {
+  return matchMedia("(prefers-color-scheme: light)").matches ? "light" : "dark";
+}

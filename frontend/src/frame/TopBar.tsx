@@ -1,0 +1,132 @@
+import { ActionIcon, Tooltip } from "@mantine/core";
+import {
+  IconAlertTriangle,
+  IconBroadcast,
+  IconCpu,
+  IconLanguage,
+  IconMoon,
+  IconPlugOff,
+  IconSun,
+  IconWifiOff,
+} from "@tabler/icons-react";
+import { useQuery } from "@tanstack/react-query";
+import { useComputedColorScheme } from "@mantine/core";
+import { turbineQuery } from "../api/queries";
+import type { LinkData, Mode } from "../api/types";
+import { useHearing, useLink, useLoadHistory, useServerNow } from "../live/live";
+import { figure } from "../model/values";
+import { useTexts } from "../texts/texts";
+import { Sparkline } from "../ui/Sparkline";
+import { clock, megabytes } from "../ui/format";
+import classes from "./Frame.module.css";
+import { StopButtons } from "./StopButtons";
+import { usePageSearch } from "./search";
+
+const SECOND_MS = 1000;
+
+export function TopBar() {
+  const turbine = useQuery(turbineQuery).data;
+  const link = useLink();
+  return (
+    <header className={classes.top}>
+      <span className={classes.turbine} data-testid="turbine">
+        {turbine?.name ?? "–"}
+      </span>
+      <ModeBadge mode={link?.mode ?? "none"} connected={link?.state === "connected"} />
+      <BusFacts link={link} />
+      <RecordingLight link={link} />
+      <div className={classes.spacer} />
+      <Tools />
+      <StopButtons />
+    </header>
+  );
+}
+
+const MODE_ICONS = { live: IconBroadcast, twin: IconCpu, none: IconPlugOff, deaf: IconWifiOff };
+
+function ModeBadge({ mode, connected }: { mode: Mode; connected: boolean }) {
+  const t = useTexts();
+  const deaf = useHearing().state === "deaf";
+  const shown = deaf ? "deaf" : connected ? mode : "none";
+  const Icon = MODE_ICONS[shown];
+  return (
+    <span className={classes.badge} data-mode={shown} data-testid="mode" role="status">
+      <Icon size={19} aria-hidden />
+      {t(`page.mode.${shown}`)}
+      {shown === "twin" && <small>{t("page.mode.simulated")}</small>}
+    </span>
+  );
+}
+
+function BusFacts({ link }: { link: LinkData | null }) {
+  const t = useTexts();
+  const history = useLoadHistory();
+  if (!link) return null;
+  const connected = link.state === "connected";
+  const load = t("page.bus.load", { load: figure(link.load * 100, 0, t.language).padStart(2, " ") });
+  return (
+    <div className={`${classes.record} bench`} data-testid="bus">
+      <div className={classes.facts}>
+        <strong>{connected ? load : t(`page.link.${link.state}`)}</strong>
+        <span className="dim">
+          {t("page.bus.facts", { bus: link.bus, kbit: figure(link.bitrate / 1000, 0, t.language) })}
+        </span>
+      </div>
+      {connected && (
+        <Sparkline values={history} max={1} className={classes.sparkline ?? ""} label={t("page.bus.sparkline")} />
+      )}
+    </div>
+  );
+}
+
+function RecordingLight({ link }: { link: LinkData | null }) {
+  const t = useTexts();
+  const nowMs = useServerNow(SECOND_MS);
+  const recording = link?.recording;
+  if (!recording) return null;
+  const on = recording.state === "on";
+  const ranMs = recording.since_ns === null ? 0 : nowMs - recording.since_ns / 1e6;
+  const losing = recording.lost > 0;
+  return (
+    <Tooltip label={recording.file ?? recording.reason ?? t(`page.recording.${recording.state}`)}>
+      <div className={`${classes.record} bench`} data-testid="recording" tabIndex={0}>
+        <span className={classes.light} data-on={on} aria-hidden />
+        <div className={classes.facts}>
+          <strong>{on ? t("page.recording.running", { clock: clock(ranMs) }) : t(`page.recording.${recording.state}`)}</strong>
+          <span className={losing ? "tone-error" : "dim"}>
+            {losing && <IconAlertTriangle size={13} aria-hidden />}{" "}
+            {t("page.recording.facts", { size: megabytes(recording.size_bytes, t.language), lost: recording.lost })}
+          </span>
+        </div>
+      </div>
+    </Tooltip>
+  );
+}
+
+function Tools() {
+  const t = useTexts();
+  const [, update] = usePageSearch();
+  const scheme = useComputedColorScheme();
+  const other = scheme === "dark" ? "light" : "dark";
+  const language = t.language === "en" ? "de" : "en";
+  return (
+    <div className={classes.tools}>
+      <Tooltip label={t("page.tools.language")}>
+        <ActionIcon
+          w={58}
+          aria-label={t("page.tools.language")}
+          data-testid="language"
+          onClick={() => update({ lang: language })}
+        >
+          <IconLanguage size={18} aria-hidden />
+          <span style={{ marginLeft: 4, fontSize: 13, fontWeight: 600 }}>{language.toUpperCase()}</span>
+        </ActionIcon>
+      </Tooltip>
+      <Tooltip label={t(`page.tools.${other}`)}>
+        <ActionIcon aria-label={t(`page.tools.${other}`)} data-testid="theme" onClick={() => update({ theme: other })}>
+          {scheme === "dark" ? <IconSun size={18} aria-hidden /> : <IconMoon size={18} aria-hidden />}
+        </ActionIcon>
+      </Tooltip>
+    </div>
+  );
+}

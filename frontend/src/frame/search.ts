@@ -1,0 +1,73 @@
+/** All state of the page that a link can share lives in the URL; this is its shape. */
+import { useNavigate, useSearch } from "@tanstack/react-router";
+import { useCallback } from "react";
+import type { Language } from "../api/types";
+
+export type Theme = "dark" | "light";
+
+export interface PageSearch {
+  lang?: Language;
+  theme?: Theme;
+  /** The 3D dock is open unless it says "off". */
+  scene?: "off";
+  events?: "open";
+  device?: string;
+  q?: string;
+  /** "changed" shows only what differs from the default. */
+  only?: "changed";
+  /** Groups that are closed, separated by commas. */
+  closed?: string;
+  /** Column, with a minus sign before it where descending. */
+  sort?: string;
+  /** Columns that are hidden, separated by commas. */
+  hide?: string;
+  /** Address of the parameter that is open. */
+  edit?: string;
+}
+
+const TEXTS = ["device", "q", "closed", "sort", "hide", "edit"] as const;
+
+/** Takes what is valid and leaves the rest: a damaged link opens the page all the same. */
+export function readSearch(raw: Record<string, unknown>): PageSearch {
+  const search: PageSearch = {};
+  if (raw.lang === "en" || raw.lang === "de") search.lang = raw.lang;
+  if (raw.theme === "dark" || raw.theme === "light") search.theme = raw.theme;
+  if (raw.scene === "off") search.scene = raw.scene;
+  if (raw.events === "open") search.events = raw.events;
+  if (raw.only === "changed") search.only = raw.only;
+  for (const name of TEXTS) {
+    const text = raw[name];
+    if (typeof text === "string" && text !== "") search[name] = text;
+  }
+  return search;
+}
+
+/** Plain `name=text` pairs, so that `?device=wtg-07/blade-2/pmc&edit=3110:01` reads as it is written. */
+export function parseSearch(text: string): Record<string, string> {
+  return Object.fromEntries(new URLSearchParams(text));
+}
+
+export function stringifySearch(search: Record<string, unknown>): string {
+  const pairs = Object.entries(search).filter((pair): pair is [string, string] => typeof pair[1] === "string");
+  if (pairs.length === 0) return "";
+  return `?${new URLSearchParams(pairs).toString().replaceAll("%2F", "/").replaceAll("%3A", ":").replaceAll("%2C", ",")}`;
+}
+
+type Change = { [K in keyof PageSearch]?: PageSearch[K] | undefined };
+
+/** The search of the URL and a way to change parts of it; `undefined` takes a part out. */
+export function usePageSearch(): [PageSearch, (change: Change) => void] {
+  const search: PageSearch = useSearch({ strict: false });
+  const navigate = useNavigate();
+  const update = useCallback(
+    (change: Change) => {
+      void navigate({
+        to: ".",
+        search: (before: PageSearch) => readSearch({ ...before, ...change }),
+        replace: true,
+      });
+    },
+    [navigate],
+  );
+  return [search, update];
+}

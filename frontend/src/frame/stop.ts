@@ -1,0 +1,85 @@
+/** STOP and FEATHER: sent at once, to every axis; "sent" until the drive confirms. */
+import { useMutation } from "@tanstack/react-query";
+import { useEffect } from "react";
+import { commands } from "../api/client";
+import type { AxisData, StopResult } from "../api/types";
+import { store } from "../live/live";
+import { type Translate, useTexts } from "../texts/texts";
+import { lastOf } from "../ui/format";
+import { notify } from "../ui/notices";
+import { storyOf } from "../ui/problem";
+
+export enum Halt {
+  Stop = "stop",
+  Feather = "feather",
+}
+
+const STANDS_STILL_DPS = 0.05;
+const AT_REST = ["not_ready_to_switch_on", "switch_on_disabled", "ready_to_switch_on", "switched_on", "fault"];
+
+/** True unless every axis is known to be without power and at rest: what is unknown may move. */
+export function mayMove(axes: Iterable<AxisData>): boolean {
+  for (const axis of axes) {
+    if (axis.state === null || !AT_REST.some((name) => axis.state?.split(".").at(-1) === name)) return true;
+    if (Math.abs(axis.velocity_dps ?? 0) > STANDS_STILL_DPS) return true;
+  }
+  return false;
+}
+
+export function useHalt(halt: Halt) {
+  const t = useTexts();
+  return useMutation({
+    mutationFn: () => (halt === Halt.Stop ? commands.stop() : commands.feather()),
+    onSuccess: (result) => {
+      const confirmed = result.axes.length > 0 && result.axes.every((axis) => axis.confirmed_t_ns !== null);
+      const failed = result.axes.some((axis) => axis.how === "failed");
+      notify({
+        tone: confirmed ? "ok" : failed ? "error" : "warning",
+        title: t(`page.${halt}.${confirmed ? "confirmed" : "unconfirmed"}`),
+        lines: haltLines(halt, result, t),
+      });
+    },
+    onError: (error) => {
+      const story = storyOf(error, t);
+      notify({ tone: "error", title: t(`page.${halt}.failed`), lines: [story.happened, t("page.stop.use_hardware")] });
+    },
+  });
+}
+
+function haltLines(halt: Halt, result: StopResult, t: Translate): string[] {
+  return result.axes.map((axis) => {
+    const device = lastOf(axis.device);
+    if (axis.how === "failed") return t("page.stop.axis_failed", { device });
+    if (axis.confirmed_t_ns === null) return t("page.stop.axis_sent", { device });
+    const ms = Math.round((axis.confirmed_t_ns - axis.sent_t_ns) / 1e6);
+    return t(`page.${halt}.axis_confirmed`, { device, ms });
+  });
+}
+
+type StopRequest = () => void;
+let stopNow: StopRequest | null = null;
+
+/** The STOP button lends its action to the Esc key. */
+export function useLendStop(stop: StopRequest): void {
+  useEffect(() => {
+    stopNow = stop;
+    return () => {
+      stopNow = null;
+    };
+  }, [stop]);
+}
+
+/** While anything can move, Esc is STOP and nothing else. Taken in the capture phase, before any dialog sees it. */
+export function stopOnEscape(event: KeyboardEvent): void {
+  if (event.key !== "Escape" || store.link?.state !== "connected" || !mayMove(store.axes.values())) return;
+  event.preventDefault();
+  event.stopImmediatePropagation();
+  if (!event.repeat) stopNow?.();
+}
+
+export function useEscapeStops(): void {
+  useEffect(() => {
+    window.addEventListener("keydown", stopOnEscape, { capture: true });
+    return () => window.removeEventListener("keydown", stopOnEscape, { capture: true });
+  }, []);
+}

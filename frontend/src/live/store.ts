@@ -1,0 +1,175 @@
+/**
+ * What the page knows of the bench, fed by the socket alone.
+ *
+ * Messages are taken in at once but shown coalesced: listeners of a topic are told at most once a tick of `schedule`
+ * (an animation frame in the browser), however many messages came. Topics: "hearing", "link", "nodes", "axes", "events",
+ * "device:<slug>" and "value:<slug>/<address>".
+ */
+import type { AxisData, EventData, LinkData, NodeData, ServerMessage, ValueData } from "../api/types";
+import { Trace } from "./trace";
+
+export const MAX_EVENTS = 500;
+const LOAD_HISTORY = 60;
+
+/** A value as shown: what the socket said, and when it last became another one. */
+export interface Cell extends ValueData {
+  changedAtMs: number | null;
+}
+
+export interface HearingState {
+  state: "connecting" | "hearing" | "deaf";
+  /** Wall clock of the page, ms, when the last message came. */
+  sinceMs: number | null;
+}
+
+export interface NumberedEvent extends EventData {
+  id: number;
+}
+
+type Listener = () => void;
+
+export class LiveStore {
+  hearing: HearingState = { state: "connecting", sinceMs: null };
+  link: LinkData | null = null;
+  nodes: ReadonlyMap<string, NodeData> = new Map();
+  axes: ReadonlyMap<number, AxisData> = new Map();
+  events: readonly NumberedEvent[] = [];
+  loadHistory: readonly number[] = [];
+  readonly traces = new Map<number, Trace>();
+
+  private readonly devices = new Map<string, Map<string, Cell>>();
+  private readonly snapshots = new Map<string, number>();
+  private readonly awaitingSnapshot = new Set<string>();
+  private readonly listeners = new Map<string, Set<Listener>>();
+  private readonly dirty = new Set<string>();
+  private readonly schedule: (flush: () => void) => void;
+  private readonly nowMs: () => number;
+  private scheduled = false;
+  private nextEventId = 1;
+  private serverOffsetMs: number | null = null;
+
+  constructor(schedule: (flush: () => void) => void, nowMs: () => number) {
+    this.schedule = schedule;
+    this.nowMs = nowMs;
+  }
+
+  subscribe(topic: string, listener: Listener): () => void {
+    const set = this.listeners.get(topic) ?? new Set();
+    this.listeners.set(topic, set);
+    set.add(listener);
+    return () => {
+      set.delete(listener);
+      if (set.size === 0) this.listeners.delete(topic);
+    };
+  }
+
+  /** Clock of the server now, in ms since 1970, as far as it is known. */
+  serverNowMs(): number {
+    return this.nowMs() + (this.serverOffsetMs ?? 0);
+  }
+
+  cell(device: string, address: string): Cell | undefined {
+    return this.devices.get(device)?.get(address);
+  }
+
+  cells(device: string): ReadonlyMap<string, Cell> | undefined {
+    return this.devices.get(device);
+  }
+
+  /** Number of value messages seen for the device; 0 before its first snapshot. */
+  version(device: string): number {
+    return this.snapshots.get(device) ?? 0;
+  }
+
+  setHearing(state: HearingState): void {
+    if (state.state === this.hearing.state && state.sinceMs === this.hearing.sinceMs) return;
+    this.hearing = state;
+    this.mark("hearing");
+  }
+
+  /** The next values of these devices are full snapshots, which replace what is known. */
+  expectSnapshots(devices: Iterable<string>): void {
+    for (const device of devices) this.awaitingSnapshot.add(device);
+  }
+
+  apply(message: ServerMessage): void {
+    this.serverOffsetMs = message.t_ns / 1e6 - this.nowMs();
+    switch (message.type) {
+      case "hello":
+      case "heartbeat":
+        return;
+      case "link":
+        this.link = message.data;
+        this.loadHistory = [...this.loadHistory, message.data.load].slice(-LOAD_HISTORY);
+        return this.mark("link");
+      case "nodes":
+        this.nodes = new Map([...this.nodes, ...message.data.map((node) => [node.device, node] as const)]);
+        return this.mark("nodes");
+      case "axes":
+        return this.applyAxes(message.data, message.t_ns);
+      case "values":
+        return this.applyValues(message.data.device, message.data.values);
+      case "event":
+        return this.applyEvent(message.data);
+    }
+  }
+
+  private applyAxes(axes: AxisData[], tNs: number): void {
+    this.axes = new Map([...this.axes, ...axes.map((axis) => [axis.blade, axis] as const)]);
+    for (const axis of axes) {
+      const trace = this.traces.get(axis.blade) ?? new Trace();
+      this.traces.set(axis.blade, trace);
+      // A stale position is a gap in the trace, never the last value drawn on.
+      trace.push(tNs / 1e9, axis.stale ? null : axis.position_deg, axis.stale ? null : axis.demand_deg);
+    }
+    this.mark("axes");
+  }
+
+  private applyValues(device: string, values: Record<string, ValueData>): void {
+    const known = this.devices.get(device) ?? new Map<string, Cell>();
+    this.devices.set(device, known);
+    if (this.awaitingSnapshot.delete(device)) this.dropMissing(device, known, values);
+    for (const [address, value] of Object.entries(values)) {
+      const before = known.get(address);
+      const changed = before?.known === true && value.known && before.hex !== value.hex;
+      known.set(address, { ...value, changedAtMs: changed ? this.nowMs() : (before?.changedAtMs ?? null) });
+      this.mark(`value:${device}/${address}`);
+    }
+    this.snapshots.set(device, this.version(device) + 1);
+    this.mark(`device:${device}`);
+  }
+
+  private dropMissing(device: string, known: Map<string, Cell>, values: Record<string, ValueData>): void {
+    for (const address of known.keys()) {
+      if (address in values) continue;
+      known.delete(address);
+      this.mark(`value:${device}/${address}`);
+    }
+  }
+
+  private applyEvent(event: EventData): void {
+    // After a new connection the server tells the recent events again: each is shown once, in order of time.
+    const same = (one: EventData) =>
+      one.t_ns === event.t_ns && one.text_key === event.text_key && one.device === event.device;
+    if (this.events.some(same)) return;
+    const at = this.events.findIndex((one) => one.t_ns <= event.t_ns);
+    const place = at < 0 ? this.events.length : at;
+    this.events = this.events.toSpliced(place, 0, { ...event, id: this.nextEventId }).slice(0, MAX_EVENTS);
+    this.nextEventId += 1;
+    this.mark("events");
+  }
+
+  private mark(topic: string): void {
+    this.dirty.add(topic);
+    if (this.scheduled) return;
+    this.scheduled = true;
+    this.schedule(() => this.flush());
+  }
+
+  private flush(): void {
+    this.scheduled = false;
+    const topics = [...this.dirty];
+    this.dirty.clear();
+    for (const topic of topics) for (const listener of [...(this.listeners.get(topic) ?? [])]) listener();
+  }
+}

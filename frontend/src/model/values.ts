@@ -1,0 +1,198 @@
+/**
+ * The three forms of a value: raw (as the object holds it), scaled (number with a unit), shown (text).
+ * The same readings as the server's, so that what is typed here is refused here; the server decides all the same.
+ */
+import type { DescriptionDoc, EntryDoc, Language, LimitDoc, QuantityDoc, Raw } from "../api/types";
+import { divide, type Fraction, fraction, fractionOf, times, toFixed, toNumber, wholeOf } from "./decimal";
+
+/** Latest known raw value of another object of the device. */
+export type Lookup = (address: string) => Raw | null;
+
+export interface Quantity {
+  unit: string;
+  scale: Fraction;
+  decimals: number;
+}
+
+const MAX_DECIMALS = 6;
+const FULL_TURN_DEG = 360;
+const TEXT_TYPES = new Set(["VISIBLE_STRING", "UNICODE_STRING"]);
+const FLOAT_TYPES = new Set(["REAL32", "REAL64"]);
+
+export const isText = (entry: EntryDoc): boolean => TEXT_TYPES.has(entry.type);
+export const isFloat = (entry: EntryDoc): boolean => FLOAT_TYPES.has(entry.type);
+export const isInteger = (entry: EntryDoc): boolean => entry.range !== null;
+export const isOctets = (entry: EntryDoc): boolean => !isText(entry) && !isFloat(entry) && !isInteger(entry);
+
+/** Unit and factor in force; those of the defaults where they rest on objects that are not known. */
+export function quantityOf(entry: EntryDoc, lookup: Lookup): Quantity {
+  const own = quantity(entry);
+  const rule = entry.unit_from;
+  if (!rule) return own;
+  const source = lookup(rule.address);
+  if (typeof source !== "number") return own;
+  if (rule.shaft === null) {
+    const choice = rule.choices[String(source)];
+    return choice ? quantity(choice) : own;
+  }
+  const shaft = lookup(rule.shaft);
+  if (typeof shaft !== "number" || shaft === 0 || source === 0) return own;
+  // A feed of `source` units per `shaft` revolutions (CiA 402), shown in degrees.
+  return { ...own, scale: divide(fractionOf(FULL_TURN_DEG * shaft), fractionOf(source)) };
+}
+
+function quantity(doc: QuantityDoc): Quantity {
+  return { unit: doc.unit, scale: fractionOf(doc.scale), decimals: Math.min(doc.decimals, MAX_DECIMALS) };
+}
+
+export const isHex = (entry: EntryDoc): boolean => entry.hexadecimal || entry.bits !== null;
+
+/** Text of a value without its unit, in the manner of the language (decimal comma in German). */
+export function show(entry: EntryDoc, raw: Raw, lookup: Lookup, language: Language): string {
+  if (typeof raw === "string") return isOctets(entry) ? octets(raw) : raw;
+  if (isHex(entry) && isInteger(entry)) return hexadecimal(entry, raw);
+  const { scale, decimals } = quantityOf(entry, lookup);
+  const scaled = times(fractionOf(raw), scale);
+  const text = isFloat(entry) ? shortest(toNumber(scaled)) : toFixed(scaled, decimals);
+  return localise(text, language);
+}
+
+export function localise(text: string, language: Language): string {
+  return language === "de" ? text.replace(".", ",") : text;
+}
+
+/** Plain number with a fixed count of decimals, for figures that are no parameters. */
+export function figure(number: number, decimals: number, language: Language): string {
+  return localise(number.toFixed(decimals), language);
+}
+
+export function hexadecimal(entry: EntryDoc, raw: number): string {
+  const bits = BigInt(Math.max(8, entry.bit_count ?? 8));
+  const pattern = BigInt.asUintN(Number(bits), BigInt(raw));
+  return `${pattern.toString(16).toUpperCase().padStart(Number(bits / 4n), "0")}h`;
+}
+
+function octets(hex: string): string {
+  return (hex.replaceAll(" ", "").toUpperCase().match(/.{1,2}/g) ?? []).join(" ");
+}
+
+function shortest(number: number): string {
+  return String(Number(number.toPrecision(7)));
+}
+
+/** Raw default, with the node's number added where the description says so; null where none is given. */
+export function defaultOf(entry: EntryDoc, node: number): Raw | null {
+  if (entry.default === null) return null;
+  if (typeof entry.default === "object") return entry.default.hex;
+  return entry.node_id && typeof entry.default === "number" ? entry.default + node : entry.default;
+}
+
+export interface Limits {
+  low: number | null;
+  high: number | null;
+}
+
+/** Raw limits in force, those of the data type included; a limit that rests on an unknown object is left out. */
+export function limitsOf(entry: EntryDoc, lookup: Lookup): Limits {
+  const [typeLow, typeHigh] = entry.range ?? [null, null];
+  return {
+    low: tighter(resolve(entry.minimum, lookup), typeLow, Math.max),
+    high: tighter(resolve(entry.maximum, lookup), typeHigh, Math.min),
+  };
+}
+
+/** Limits that the description itself sets, for the table: those of the data type alone tell nobody anything. */
+export function ownLimitsOf(entry: EntryDoc, lookup: Lookup): Limits {
+  return { low: resolve(entry.minimum, lookup), high: resolve(entry.maximum, lookup) };
+}
+
+function resolve(limit: LimitDoc | null, lookup: Lookup): number | null {
+  if (limit === null || typeof limit === "number") return limit;
+  const found = lookup(limit.address);
+  return typeof found === "number" ? toNumber(times(fractionOf(found), fractionOf(limit.factor))) : null;
+}
+
+function tighter(own: number | null, type: number | null, pick: (a: number, b: number) => number): number | null {
+  if (own === null || type === null) return own ?? type;
+  return pick(own, type);
+}
+
+export enum Misfit {
+  Empty = "empty",
+  NoNumber = "no_number",
+  NoHex = "no_hex",
+  Unit = "unit",
+  Resolution = "resolution",
+  BelowLimit = "below",
+  AboveLimit = "above",
+  NotListed = "not_listed",
+  TooLarge = "too_large",
+  NotAscii = "not_ascii",
+}
+
+export type Parsed = { ok: true; raw: Raw } | { ok: false; why: Misfit };
+
+const NUMBER = /^([-+]?\d+(?:[.,]\d+)?)\s*(\D.*)?$/;
+const HEX = /^(?:0x([0-9a-f]+)|([0-9a-f]+)h)$/i;
+const RAW = /^raw:\s*([-+]?\d+|0x[0-9a-f]+)$/i;
+
+/** Reads what a person typed: `49.5`, `49,5 °C`, `0x1F`, `1Fh`, `raw:495`; checks type, resolution and limits. */
+export function parse(doc: DescriptionDoc, entry: EntryDoc, typed: string, lookup: Lookup): Parsed {
+  const text = typed.trim();
+  // eslint-disable-next-line no-control-regex -- a VISIBLE_STRING is ASCII
+  if (isText(entry)) return /^[\x00-\x7f]*$/.test(text) ? { ok: true, raw: text } : misfit(Misfit.NotAscii);
+  if (text === "") return misfit(Misfit.Empty);
+  if (isOctets(entry)) return parseOctets(text);
+  const parsed = rawNumber(entry, text) ?? scaledNumber(entry, text, lookup);
+  return parsed.ok && typeof parsed.raw === "number" ? checkNumber(doc, entry, parsed.raw, lookup) : parsed;
+}
+
+/** Checks a raw number against limits and an exclusive enumeration. */
+export function checkNumber(doc: DescriptionDoc, entry: EntryDoc, raw: number, lookup: Lookup): Parsed {
+  const { low, high } = limitsOf(entry, lookup);
+  if (low !== null && raw < low) return misfit(Misfit.BelowLimit);
+  if (high !== null && raw > high) return misfit(Misfit.AboveLimit);
+  const table = entry.enumeration === null ? undefined : doc.enumerations[entry.enumeration];
+  if (table?.exclusive && !table.values.some((one) => one.value === raw)) return misfit(Misfit.NotListed);
+  return { ok: true, raw };
+}
+
+function parseOctets(text: string): Parsed {
+  const digits = text.replaceAll(/\s/g, "");
+  if (!/^(?:[0-9a-f]{2})+$/i.test(digits)) return misfit(Misfit.NoHex);
+  return { ok: true, raw: digits.toUpperCase() };
+}
+
+function rawNumber(entry: EntryDoc, text: string): Parsed | null {
+  const marked = RAW.exec(text);
+  if (marked) return safe(marked[1]?.startsWith("-") ? -BigInt(marked[1].slice(1)) : BigInt((marked[1] ?? "0").replace("+", "")));
+  const hex = HEX.exec(text);
+  if (!hex) return null;
+  const number = BigInt(`0x${hex[1] ?? hex[2] ?? "0"}`);
+  const bits = entry.bit_count ?? 0;
+  // A hexadecimal number is a bit pattern: FFFFh of an INTEGER16 is -1.
+  const signed = (entry.range?.[0] ?? 0) < 0 && bits > 0 && number >> BigInt(bits - 1) === 1n;
+  return safe(signed ? number - (1n << BigInt(bits)) : number);
+}
+
+function scaledNumber(entry: EntryDoc, text: string, lookup: Lookup): Parsed {
+  const match = NUMBER.exec(text);
+  const typed = match ? fraction(match[1] ?? "") : null;
+  if (!match || !typed) return misfit(Misfit.NoNumber);
+  const { unit, scale } = quantityOf(entry, lookup);
+  const typedUnit = match[2]?.trim() ?? "";
+  if (typedUnit !== "" && typedUnit !== unit) return misfit(Misfit.Unit);
+  const exact = divide(typed, scale);
+  if (isFloat(entry)) return { ok: true, raw: toNumber(exact) };
+  const whole = wholeOf(exact);
+  return whole === null ? misfit(Misfit.Resolution) : safe(whole);
+}
+
+function safe(number: bigint): Parsed {
+  const plain = Number(number);
+  return Number.isSafeInteger(plain) ? { ok: true, raw: plain } : misfit(Misfit.TooLarge);
+}
+
+function misfit(why: Misfit): Parsed {
+  return { ok: false, why };
+}

@@ -1,0 +1,87 @@
+import "uplot/dist/uPlot.min.css";
+import { useComputedColorScheme } from "@mantine/core";
+import { useEffect, useRef } from "react";
+import UPlot from "uplot";
+import { store } from "../../live/live";
+import { TRACE_S } from "../../live/trace";
+import { useTexts } from "../../texts/texts";
+import { localise } from "../../model/values";
+import classes from "./Overview.module.css";
+
+const REDRAW_MS = 200;
+const HEIGHT_PX = 132;
+const MARKS_S = [45, 30, 15, 0];
+/** The scale never closes in below this, so that noise of a still blade does not look like motion. */
+const LEAST_SPAN_DEG = 4;
+
+/** Angle (line) and demand (dashes) of the last minute. Gaps stay gaps. */
+export function AngleTrace({ blade, label }: { blade: number; label: string }) {
+  const t = useTexts();
+  const { language } = t;
+  const holder = useRef<HTMLDivElement>(null);
+  const scheme = useComputedColorScheme();
+  useEffect(() => {
+    const element = holder.current;
+    if (!element) return;
+    const columns = () => store.traces.get(blade)?.columns() ?? [[], [], []];
+    const plot = new UPlot(options(element, (text) => localise(text, language)), columns(), element);
+    const timer = setInterval(() => plot.setData(columns()), REDRAW_MS);
+    const observer = new ResizeObserver(() => plot.setSize({ width: element.clientWidth, height: HEIGHT_PX }));
+    observer.observe(element);
+    return () => {
+      clearInterval(timer);
+      observer.disconnect();
+      plot.destroy();
+    };
+  }, [blade, scheme, language]);
+  return <div ref={holder} className={classes.trace} role="img" aria-label={label} />;
+}
+
+function options(element: HTMLElement, show: (text: string) => string): UPlot.Options {
+  const style = getComputedStyle(element);
+  const colour = (name: string) => style.getPropertyValue(name).trim();
+  const axis: UPlot.Axis = {
+    stroke: colour("--hs-dim"),
+    font: `11px ${style.fontFamily}`,
+    grid: { stroke: colour("--hs-line"), width: 1 },
+    ticks: { show: false },
+  };
+  return {
+    width: element.clientWidth,
+    height: HEIGHT_PX,
+    legend: { show: false },
+    cursor: { show: false },
+    padding: [6, 6, 0, 0],
+    scales: {
+      x: { time: false, range: () => windowNow() },
+      y: { range: (_plot, low, high) => spanOf(low, high) },
+    },
+    axes: [
+      {
+        ...axis,
+        size: 18,
+        gap: 2,
+        splits: (_plot, _axis, _low, now) => MARKS_S.map((ago) => now - ago),
+        values: () => MARKS_S.map((ago) => `${ago === 0 ? "" : "−"}${ago} s`),
+      },
+      { ...axis, size: 40, gap: 4, space: 26, values: (_plot, splits) => splits.map((at) => `${show(String(at))}°`) },
+    ],
+    series: [
+      {},
+      { stroke: colour("--hs-accent"), width: 2, points: { show: false } },
+      { stroke: colour("--hs-warn"), width: 1.25, dash: [5, 4], points: { show: false } },
+    ],
+  };
+}
+
+function windowNow(): [number, number] {
+  const now = store.serverNowMs() / 1000;
+  return [now - TRACE_S, now];
+}
+
+function spanOf(low: number | null, high: number | null): [number, number] {
+  if (low === null || high === null) return [0, 90];
+  const middle = (low + high) / 2;
+  const half = Math.max(LEAST_SPAN_DEG, (high - low) * 1.15) / 2;
+  return [middle - half, middle + half];
+}

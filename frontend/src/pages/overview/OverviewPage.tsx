@@ -1,0 +1,21 @@
+import { useQuery } from "@tanstack/react-query";
+import { turbineQuery } from "../../api/queries";
+import { Attention } from "./Attention";
+import { BladeCard } from "./BladeCard";
+import classes from "./Overview.module.css";
+
+/** Three blades at one look, and above them what needs a look. */
+export function OverviewPage() {
+  const turbine = useQuery(turbineQuery).data;
+  const blades = (turbine?.stations ?? []).filter((station) => station.blade !== null);
+  return (
+    <div className={classes.page}>
+      <Attention />
+      <div className={classes.cards}>
+        {blades.map((station) => (
+          <BladeCard key={station.slug} station={station} />
+        ))}
+      </div>
+    </div>
+  );
+}

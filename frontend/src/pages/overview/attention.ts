@@ -1,0 +1,72 @@
+/** What needs a look, worst first. Each finding names the text and where to go. */
+import type { AxisData, Details, LinkData, NodeData, Turbine } from "../../api/types";
+import { placesOf } from "../../ui/devices";
+import { errorCode } from "../../ui/format";
+import { Heard, heartbeatOf } from "./nodes";
+
+export interface Finding {
+  id: string;
+  tone: "warning" | "error";
+  key: string;
+  details: Details;
+  /** Slug of the device to open, if one is meant. */
+  device: string | null;
+}
+
+interface Seen {
+  turbine: Turbine | undefined;
+  link: LinkData | null;
+  nodes: ReadonlyMap<string, NodeData>;
+  axes: ReadonlyMap<number, AxisData>;
+  nowMs: number;
+}
+
+export function findingsOf(seen: Seen): Finding[] {
+  const all = [...linkFindings(seen.link), ...axisFindings(seen), ...nodeFindings(seen)];
+  return [...all.filter((one) => one.tone === "error"), ...all.filter((one) => one.tone === "warning")];
+}
+
+function linkFindings(link: LinkData | null): Finding[] {
+  if (!link) return [];
+  const found: Finding[] = [];
+  const add = (tone: Finding["tone"], id: string, details: Details = {}) =>
+    found.push({ id, tone, key: `page.attention.${id}`, details, device: null });
+  if (link.state !== "connected") add("error", `link_${link.state}`, { reason: link.reason });
+  if (link.recording.state === "stopped") add("error", "recording_stopped", { reason: link.recording.reason });
+  if (link.recording.state === "off") add("warning", "recording_off");
+  if (link.recording.lost > 0) add("error", "recording_lost", { lost: link.recording.lost });
+  if (link.other_masters.length > 0) add("warning", "other_masters");
+  return found;
+}
+
+function axisFindings({ axes, turbine }: Seen): Finding[] {
+  return [...axes.values()]
+    .filter((axis) => axis.fault_code !== null && axis.fault_code !== 0)
+    .map((axis) => ({
+      id: `fault_${axis.blade}`,
+      tone: "error",
+      key: "page.attention.fault",
+      details: { blade: axis.blade, code: errorCode(axis.fault_code ?? 0), text_key_text: axis.fault_text_key },
+      device: deviceOf(turbine, axis.blade, "pmc"),
+    }));
+}
+
+function deviceOf(turbine: Turbine | undefined, blade: number, name: string): string | null {
+  const place = placesOf(turbine).find((one) => one.station.blade === blade && one.device.slug.endsWith(`/${name}`));
+  return place?.device.slug ?? null;
+}
+
+function nodeFindings({ turbine, link, nodes, nowMs }: Seen): Finding[] {
+  if (link?.state !== "connected") return [];
+  return placesOf(turbine).flatMap(({ station, device }): Finding[] => {
+    const node = nodes.get(device.slug);
+    const { heard, ageMs } = heartbeatOf(node, nowMs);
+    const details = { blade: station.blade, device: device.name, seconds: Math.round((ageMs ?? 0) / 1000) };
+    const finding = (tone: Finding["tone"], name: string): Finding[] => [
+      { id: `${name}_${device.slug}`, tone, key: `page.attention.${name}`, details, device: device.slug },
+    ];
+    if (heard === Heard.Never) return finding("warning", "node_silent");
+    if (heard === Heard.Overdue) return finding("error", "node_overdue");
+    return node?.nmt === "stopped" ? finding("warning", "node_stopped") : [];
+  });
+}

@@ -1,0 +1,66 @@
+import { Alert, Button, Progress } from "@mantine/core";
+import { IconClockOff, IconRefresh } from "@tabler/icons-react";
+import { useMemo } from "react";
+import { store, useDeviceVersion, useNodes, useServerNow } from "../../live/live";
+import { useTexts } from "../../texts/texts";
+import { age } from "../../ui/format";
+import { heartbeatOf } from "../overview/nodes";
+import { useDevice } from "./context";
+import classes from "./Parameters.module.css";
+import { useReadAll, useReadAtFirstSight } from "./readAll";
+import { useSilent } from "./silent";
+
+/** One line between tools and table: how far a reading is, or what is missing and the next step. */
+export function StateLine({ slug }: { slug: string }) {
+  const reading = useReadAll(slug);
+  useReadAtFirstSight(slug, reading);
+  const silent = useSilent(slug);
+  if (reading.running) return <Reading done={reading.job?.done ?? 0} total={reading.job?.total ?? 0} cancel={reading.cancel} />;
+  if (silent) return <Silent slug={slug} />;
+  return <Missing slug={slug} start={reading.start} />;
+}
+
+function Reading({ done, total, cancel }: { done: number; total: number; cancel: () => void }) {
+  const t = useTexts();
+  const label = t("page.read.progress", { done, total });
+  return (
+    <div className={classes.reading} role="status" data-testid="read-progress">
+      <span>{label}</span>
+      <Progress value={total === 0 ? 0 : (100 * done) / total} aria-label={label} flex={1} />
+      <Button variant="default" onClick={cancel}>
+        {t("page.cancel")}
+      </Button>
+    </div>
+  );
+}
+
+function Silent({ slug }: { slug: string }) {
+  const t = useTexts();
+  const nowMs = useServerNow(500);
+  const { ageMs } = heartbeatOf(useNodes().get(slug), nowMs);
+  const text = ageMs === null ? t("page.device.never_heard") : t("page.device.silent", { age: age(ageMs, t.language) });
+  return <Alert color="orange" variant="light" p="xs" icon={<IconClockOff aria-hidden />} title={text} data-testid="silent" />;
+}
+
+/** After a restart everything is unknown: say so and offer the one thing that helps. */
+function Missing({ slug, start }: { slug: string; start: () => void }) {
+  const t = useTexts();
+  const { doc } = useDevice();
+  const version = useDeviceVersion(slug);
+  const missing = useMemo(
+    () => doc.entries.filter((entry) => entry.readable && store.cell(slug, entry.address)?.known !== true).length,
+    // The store is read afresh whenever values of the device came.
+    // eslint-disable-next-line react-hooks/exhaustive-deps
+    [doc, slug, version],
+  );
+  if (version === 0 || missing === 0) return null;
+  const all = doc.entries.filter((entry) => entry.readable).length;
+  return (
+    <div className={classes.reading} data-testid="missing">
+      <span>{t("page.read.missing", { missing, all })}</span>
+      <Button variant="light" leftSection={<IconRefresh size={17} aria-hidden />} onClick={start}>
+        {t("page.read.now")}
+      </Button>
+    </div>
+  );
+}

@@ -1,0 +1,62 @@
+/** Reading the whole dictionary: one job a device at a time, kept beside the page so that changing rooms loses nothing. */
+import { useMutation, useQuery } from "@tanstack/react-query";
+import { useEffect } from "react";
+import { commands } from "../../api/client";
+import { jobQuery, queryClient } from "../../api/queries";
+import type { Job } from "../../api/types";
+import { store, useDeviceVersion } from "../../live/live";
+import { useTexts } from "../../texts/texts";
+import { notify } from "../../ui/notices";
+import { storyOf } from "../../ui/problem";
+import { useSilent } from "./silent";
+
+const offered = new Set<string>();
+
+export interface ReadAll {
+  job: Job | undefined;
+  running: boolean;
+  start: () => void;
+  cancel: () => void;
+}
+
+const runningKey = (slug: string) => ["reading", slug];
+
+export function useReadAll(slug: string): ReadAll {
+  const t = useTexts();
+  const id = useQuery({ queryKey: runningKey(slug), queryFn: () => null as string | null, staleTime: Infinity }).data;
+  const job = useQuery(jobQuery(id ?? null)).data;
+  const failed = (error: unknown) => {
+    const story = storyOf(error, t);
+    notify({ tone: "error", title: t("page.read.failed"), lines: [story.happened, story.next] });
+  };
+  const start = useMutation({
+    mutationFn: () => commands.read(slug, null),
+    onSuccess: (begun) => {
+      queryClient.setQueryData(["job", begun.id], begun);
+      queryClient.setQueryData(runningKey(slug), begun.id);
+    },
+    onError: failed,
+  });
+  const cancel = useMutation({ mutationFn: commands.cancel, onError: failed });
+  return {
+    job,
+    running: start.isPending || job?.state === "running",
+    start: start.mutate,
+    cancel: () => {
+      if (job) cancel.mutate(job.id);
+    },
+  };
+}
+
+/** The first time that a device without any known value is opened, it is read by itself. Never again after that. */
+export function useReadAtFirstSight(slug: string, reading: ReadAll): void {
+  const version = useDeviceVersion(slug);
+  const silent = useSilent(slug);
+  const { running, start } = reading;
+  useEffect(() => {
+    if (version === 0 || silent || running || offered.has(slug)) return;
+    offered.add(slug);
+    const known = [...(store.cells(slug)?.values() ?? [])].filter((cell) => cell.known && cell.source.startsWith("sdo"));
+    if (known.length === 0) start();
+  }, [version, silent, running, slug, start]);
+}
