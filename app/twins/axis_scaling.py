@@ -1,0 +1,67 @@
+"""From encoder increments to position units and back (manual, 5.5 and 5.6)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from math import pi
+
+from app.twins.object_store import ObjectStore
+
+_NEGATIVE = 0x80
+"""Only bit 7 of a polarity is looked at (manual, 607Eh)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Scaling:
+    """``units_per_increment`` exact; ``sign`` is -1 for negative polarity; ``offset`` the home offset in units."""
+
+    units_per_increment: Fraction
+    increments_per_turn: Fraction
+    sign: int
+    offset: int
+
+    def position(self, increments: float) -> float:
+        """Actual position: the encoder's position in units plus the home offset."""
+        return self.sign * increments * float(self.units_per_increment) + self.offset
+
+    def offset_for(self, increments: float, position: int) -> int:
+        """The home offset with which the encoder's count becomes ``position``."""
+        return position - round(self.sign * increments * float(self.units_per_increment))
+
+    @property
+    def units_per_turn(self) -> float:
+        """Position units per revolution of the encoder's shaft, with the sign of the polarity."""
+        return self.sign * float(self.increments_per_turn * self.units_per_increment)
+
+    @property
+    def units_per_rad(self) -> float:
+        """Position units per radian of the encoder's shaft."""
+        return self.units_per_turn / (2 * pi)
+
+
+def units_per_increment(resolution: Fraction, gear: Fraction, feed: Fraction) -> Fraction:
+    """Position units for one increment: feed constant / (encoder resolution x gear ratio)."""
+    return feed / (resolution * gear)
+
+
+def motor_scaling(store: ObjectStore) -> Scaling:
+    """Of the motor encoder: 608Fh, 6091h, 6092h, 607Eh, 607Ch."""
+    return _scaling(store, 0x607C, 0x607E, 0x608F, 0x6091, 0x6092)
+
+
+def blade_scaling(store: ObjectStore) -> Scaling:
+    """Of the additional encoder: 688Fh, 6891h, 6892h, 687Eh, 687Ch."""
+    return _scaling(store, 0x687C, 0x687E, 0x688F, 0x6891, 0x6892)
+
+
+def _scaling(store: ObjectStore, home: int, polarity: int, resolution: int, gear: int, feed: int) -> Scaling:
+    per_turn = _ratio(store, resolution)
+    factor = units_per_increment(per_turn, _ratio(store, gear), _ratio(store, feed))
+    sign = -1 if store.number(polarity) & _NEGATIVE else 1
+    return Scaling(factor, per_turn, sign, store.number(home))
+
+
+def _ratio(store: ObjectStore, index: int) -> Fraction:
+    """Sub-index 1 over sub-index 2. OPEN what a 0 does; it counts as 1, for a drive must not divide by it."""
+    return Fraction(store.number(index, 1) or 1, store.number(index, 2) or 1)

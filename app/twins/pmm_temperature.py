@@ -1,0 +1,113 @@
+"""Temperature supervisors and controllers of the PMM (manual, 4.6)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import Final
+
+from app.twins.object_store import ObjectStore
+from app.twins.pmm_errors import PmmErrors
+
+SENSOR_SHORT: Final = -32768
+SENSOR_OPEN: Final = 32767
+
+
+class SensorState(Enum):
+    """What a sensor input sees."""
+
+    FITTED = "fitted"
+    SHORT_CIRCUIT = "short circuit"
+    INTERRUPTED = "interrupted"
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """A measuring place: its supervisor, its controller (None: it has none) and its codes."""
+
+    supervisor: int
+    controller: int | None
+    high_code: int
+    low_code: int
+
+
+PLACES: Final = (
+    Place(0x3110, 0x3201, 0x4410, 0x4420),
+    Place(0x3111, None, 0x4210, 0x4220),
+    Place(0x3112, 0x3202, 0x4110, 0x4120),
+    Place(0x3113, 0x3203, 0x4111, 0x4121),
+)
+"""Battery, heat sink, sensor 1, sensor 2, in the order of 3006h to 3009h."""
+
+
+class TemperatureWatch:
+    """Supervises one place and drives its heater, cooler and fan."""
+
+    def __init__(self, store: ObjectStore, errors: PmmErrors, place: Place) -> None:
+        self._store = store
+        self._errors = errors
+        self._place = place
+        self._heater = self._cooler = self._fan = False
+        self._fan_off_s = 0.0
+        self.status = 0
+        self.outputs = 0
+
+    def clear(self) -> None:
+        """Begin anew, as at power-on."""
+        self._heater = self._cooler = self._fan = False
+        self._fan_off_s = 0.0
+        self.status = self.outputs = 0
+
+    def step(self, tenths_c: int, sensor: SensorState, dt_s: float) -> None:
+        """Look at a temperature in 0.1 degrees. A sensor that does not measure raises no error (4.6.2.4)."""
+        if sensor is not SensorState.FITTED:
+            self._supervise(None)
+            self._heater = self._cooler = False
+            self.status |= 1 << (6 if sensor is SensorState.SHORT_CIRCUIT else 7)
+        else:
+            self._supervise(tenths_c)
+            self._control(tenths_c)
+        self._run_fan(dt_s)
+        self._show_outputs()
+
+    def _limit(self, sub: int) -> int:
+        return self._store.number(self._place.supervisor, sub)
+
+    def _supervise(self, tenths_c: int | None) -> None:
+        """Table 32; "reached" is from the limit on, "undercut" below it. No hysteresis is printed, none is taken."""
+        low = tenths_c is not None and tenths_c < self._limit(3)
+        warning = tenths_c is not None and tenths_c >= self._limit(1)
+        error = tenths_c is not None and tenths_c >= self._limit(2)
+        self._errors.warning(self._place.low_code, low)
+        self._errors.warning(self._place.high_code, warning and not error)
+        self._errors.error(self._place.high_code, error)
+        self.status = low << 0 | warning << 4 | error << 5
+
+    def _control(self, tenths_c: int) -> None:
+        controller = self._place.controller
+        if controller is None:
+            return
+        heat, cool, hysteresis = (self._store.number(controller, sub) for sub in (1, 2, 3))
+        self._heater = tenths_c < heat or (self._heater and tenths_c < heat + hysteresis)
+        self._cooler = tenths_c > cool or (self._cooler and tenths_c > cool - hysteresis)
+
+    def _run_fan(self, dt_s: float) -> None:
+        controller = self._place.controller
+        if controller is None:
+            return
+        if self._heater or self._cooler:
+            self._fan = True
+            self._fan_off_s = self._store.number(controller, 7)
+        elif self._fan:
+            self._fan_off_s -= dt_s
+            self._fan = self._fan_off_s > 0
+
+    def _show_outputs(self) -> None:
+        controller = self._place.controller
+        if controller is None:
+            return
+        self.status |= self._fan << 1 | self._heater << 2 | self._cooler << 3
+        self.outputs = 0
+        for on, sub in ((self._heater, 4), (self._cooler, 5), (self._fan, 6)):
+            if on:
+                self.outputs |= self._store.number(controller, sub)
