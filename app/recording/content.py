@@ -1,0 +1,83 @@
+"""What goes into a recording beside frames: who recorded what, attachments, events and state keyframes."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Any, Final, NamedTuple
+
+SCHEMA_NUMBER: Final = 1
+
+METADATA_RECORDING: Final = "recording"
+METADATA_BIT_RATES: Final = "bit_rates"
+METADATA_NODES: Final = "nodes"
+METADATA_VERSIONS: Final = "versions"
+METADATA_TOTALS: Final = "totals"
+METADATA_RECOVERY: Final = "recovery"
+METADATA_CHUNK_CHANNELS: Final = "chunk_channels"
+
+
+class EventKind(Enum):
+    """What happened beside the frames. The details of each are listed in ``docs/recording-format.md``."""
+
+    FRAMES_LOST = "frames_lost"
+    GAP = "gap"
+    BUS_LOST = "bus_lost"
+    BUS_BACK = "bus_back"
+    WALL_CLOCK_STEP = "wall_clock_step"
+    WRITE = "write"
+    SPACE_LOW = "space_low"
+    DISK_ERROR = "disk_error"
+    RESUMED = "resumed"
+    NOTE = "note"
+
+
+class Event(NamedTuple):
+    """An event at ``t_ns``; ``bus`` is empty where it concerns none. ``details`` is plain JSON."""
+
+    t_ns: int
+    kind: EventKind
+    bus: str
+    details: Mapping[str, Any]
+
+
+class Keyframe(NamedTuple):
+    """The whole state at ``t_ns``, as plain JSON: it holds what all frames up to then have told."""
+
+    t_ns: int
+    state: Mapping[str, Any]
+
+
+class AttachedFile(NamedTuple):
+    """A file inside the recording: a description, a parameter set."""
+
+    name: str
+    media_type: str
+    data: bytes
+
+
+@dataclass(frozen=True)
+class RecordingInfo:
+    """What a recording is of. ``bit_rates`` in bit/s by bus; ``nodes`` maps ``can0/11`` to slug and description."""
+
+    turbine: str
+    who: str
+    bit_rates: Mapping[str, int] = field(default_factory=dict)
+    nodes: Mapping[str, str] = field(default_factory=dict)
+    versions: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class RecorderClock:
+    """The clocks of a recorder, all in ns. ``stamp`` is the Stamper that also stamps the frames."""
+
+    monotonic_ns: Callable[[], int]
+    wall_ns: Callable[[], int]
+    stamp: Callable[[], int]
+
+
+def to_json(content: Mapping[str, Any]) -> str:
+    """Canonical JSON. Raises ``TypeError`` or ``ValueError`` where the content is not plain JSON."""
+    return json.dumps(content, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
