@@ -68,6 +68,7 @@ class CanOpenDriver:
         self._listen_s = listen_s
         self._listening = False
         self._masters_before: tuple[MasterSign, ...] = ()
+        self._pending: set[asyncio.Future[Any]] = set()
         self._timeouts_ns: dict[int, dict[Address, int]] = {}
         self._port = CanPort(config.listening(True), bus, stamper, self.watch.on_frames, monotonic_ns=monotonic_ns)
         self._client = SdoClient(self._port, monotonic_ns)
@@ -110,9 +111,14 @@ class CanOpenDriver:
 
     async def close(self, timeout_s: float = 5.0) -> None:
         """End all that runs with BusLostError and close the adapter. Once closed, it stays closed."""
-        if self._port.status.state is not PortState.CLOSED:
-            self._port.call_soon(lambda: self._client.lose(BusLostError(bus=self.bus, reason="closed")))
-        await asyncio.to_thread(self._port.close, timeout_s)
+        try:
+            await asyncio.to_thread(self._port.close, timeout_s)
+        finally:
+            for future in tuple(self._pending):
+                future.get_loop().call_soon_threadsafe(_settle, future, None, self._closed_error())
+
+    def _closed_error(self) -> BusLostError:
+        return BusLostError(bus=self.bus, reason=LinkState.CLOSED.value)
 
     @property
     def status(self) -> DriverStatus:
@@ -281,8 +287,14 @@ class CanOpenDriver:
     async def _run(self, node: int, steps: Steps[T], urgent: bool = False, fenced: bool = True) -> T:
         loop = asyncio.get_running_loop()
         future: asyncio.Future[T] = loop.create_future()
+        self._pending.add(future)
+        future.add_done_callback(self._pending.discard)
 
         def on_done(result: T | None, error: Exception | None) -> None:
+            # One turn later, so that every subscriber has seen the frames before the caller has the result.
+            self._port.call_soon(lambda: hand_over(result, error))
+
+        def hand_over(result: T | None, error: Exception | None) -> None:
             loop.call_soon_threadsafe(_settle, future, result, error)
 
         job: Job[T] = Job(steps, on_done, urgent, fenced)
