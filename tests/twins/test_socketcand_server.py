@@ -15,6 +15,7 @@ import pytest
 from app.twins.line import CanLine, Port
 from app.twins.line_thread import LineThread
 from app.twins.socketcand_server import SocketcandServer, frame_element
+from app.wire.can_bits import frame_bits
 from app.wire.frame import Can
 
 
@@ -186,7 +187,8 @@ def test_line_time_orders_a_client_among_the_others(bench: Bench) -> None:
     assert [int(element[1], 16) for element in got] == list(range(0x400, 0x300, -1))
     times = [float(element[2]) for element in got]
     assert times == sorted(times)
-    assert times[-1] - times[0] == pytest.approx(255 * 55 / 500_000, rel=0.2)
+    bits = sum(frame_bits(Can(can_id, bytes([can_id & 0xFF]))) for can_id in range(0x3FF, 0x300, -1))
+    assert times[-1] - times[0] >= bits / 500_000 - 2e-6
 
 
 def test_a_client_that_floods_is_slowed_and_loses_nothing(bench: Bench) -> None:
