@@ -13,22 +13,22 @@ from contextlib import asynccontextmanager
 from typing import Any
 
 from app.cli.output import Output, error_text
-from app.cli.targets import add_connection, bare_turbine, find_device, scanned_turbine, site_turbine
+from app.cli.targets import add_connection, bare_turbine, descriptions_for, find_device, scanned_turbine, site_turbine
 from app.drivers.contract import FoundNode
-from app.errors import HubsideError, UsageError
+from app.errors import HubsideError, NoAnswerError, SdoAbortError, UsageError
 from app.model.address import parse_address
 from app.model.checks import check_read
 from app.model.datatypes import Raw
-from app.model.description import Description, Entry
-from app.model.description_file import BUILTIN, load_builtin
+from app.model.description import Entry
 from app.model.site import Turbine
 from app.model.values import show, to_scaled
-from app.service.backup import read_device, read_devices, readable, to_set, write_set
+from app.service.backup import ReadReport, read_device, read_devices, readable, to_set, write_set
 from app.service.connection import Connection
 from app.service.devices import Target
 from app.service.options import Options
 from app.service.save import restart, save
 from app.service.write import write_text
+from app.wire.sdo import Abort
 
 SWITCH_INTERVAL_S = 0.0005
 """The receive thread gets its turn sooner than Python's 5 ms, so that a request follows an answer at once."""
@@ -80,7 +80,10 @@ async def connected(
     """The connection that the arguments name; on a bare bus the devices are found by a scan first."""
     turbine = site_turbine(arguments)
     if turbine is None:
-        turbine = scanned_turbine(arguments.can, await _find(arguments, output))
+        nodes = _named_nodes(arguments)
+        found = await _find(arguments, output, nodes)
+        turbine = scanned_turbine(arguments, found)
+        _all_there(nodes, found, turbine)
     connection = _connection(arguments, turbine, arguments.record if record is None else record)
     async with connection:
         yield connection
@@ -94,19 +97,31 @@ def _connection(arguments: argparse.Namespace, turbine: Turbine, record: bool) -
         consent=arguments.consent,
         listen_s=arguments.listen_s,
     )
-    return Connection(turbine, _descriptions(), options)
+    return Connection(turbine, descriptions_for(arguments, turbine), options)
 
 
-def _descriptions() -> dict[str, Description]:
-    return {name: load_builtin(name) for name in BUILTIN}
+def _all_there(nodes: list[int] | None, found: list[FoundNode], turbine: Turbine) -> None:
+    """Raises NoAnswerError for a node that is not there, UsageError for one that nothing describes."""
+    for node in nodes or ():
+        if all(one.node != node for one in found):
+            raise NoAnswerError(node=node, address="1000", timeout_s=1)
+        if turbine.device(str(node)) is None:
+            raise UsageError(reason=f"nothing describes the device at node {node}; name its EDS file with --eds")
 
 
-async def _find(arguments: argparse.Namespace, output: Output) -> list[FoundNode]:
+def _named_nodes(arguments: argparse.Namespace) -> list[int] | None:
+    """The node numbers that the command names: nobody else need be asked. None where it names none."""
+    named = getattr(arguments, "target", [])
+    texts = [named] if isinstance(named, str) else named
+    return [int(text) for text in texts if text.isdigit() and 1 <= int(text) <= 127] or None
+
+
+async def _find(arguments: argparse.Namespace, output: Output, nodes: list[int] | None = None) -> list[FoundNode]:
     turbine = site_turbine(arguments) or bare_turbine(arguments.can)
     output.say("cli.listening", bus=", ".join(bus.connection for bus in turbine.buses))
     async with _connection(arguments, turbine, False) as connection:
-        found = [await link.driver.scan() for link in connection.buses.values()]
-    return [node for nodes in found for node in nodes]
+        found = [await link.driver.scan(nodes) for link in connection.buses.values()]
+    return [node for on_bus in found for node in on_bus]
 
 
 async def _scan(arguments: argparse.Namespace, output: Output) -> int:
@@ -171,12 +186,22 @@ async def _read(arguments: argparse.Namespace, output: Output) -> int:
     else:
         rows = [_value_row(target, target.entry(address), raw, output) for address, raw in report.values.items()]
         output.table(("ADDRESS", "NAME", "VALUE", "UNIT", "RAW"), rows)
-    for address, error in report.failed.items():
-        name = target.entry(address).title
-        output.say("cli.unread", address=address.short, name=name, reason=error_text(output.texts, error))
+    _say_unread(report, output)
     took = f"{time.monotonic() - started:.2f}"
     output.say("cli.read_done", device=target.slug, count=len(report.values), took_s=took)
     return next((error.exit_code for error in report.failed.values()), 0) if addresses else 0
+
+
+def _say_unread(report: ReadReport, output: Output) -> None:
+    """Name every object that was not read; those that hold nothing yet (an empty error history) in one line."""
+    empty = [a for a, e in report.failed.items() if isinstance(e, SdoAbortError) and e.abort_code == Abort.NO_DATA]
+    if empty:
+        output.say("cli.empty", device=report.target.slug, addresses=", ".join(address.short for address in empty))
+    for address, error in report.failed.items():
+        if address not in empty:
+            name = f"{report.target.slug} {address.short}"
+            title = report.target.entry(address).title
+            output.say("cli.unread", address=name, name=title, reason=error_text(output.texts, error))
 
 
 def _value_row(target: Target, entry: Entry, raw: Raw, output: Output) -> tuple[str, ...]:
@@ -274,11 +299,7 @@ async def _backup(arguments: argparse.Namespace, output: Output) -> int:
             continue
         parameters = to_set(report, connection.turbine.slug, settings.person, arguments.reason, time.time_ns())
         path = write_set(settings.sets / connection.turbine.slug, parameters)
-        for address, error in report.failed.items():
-            reason = error_text(output.texts, error)
-            output.say(
-                "cli.unread", address=f"{target.slug} {address.short}", name=target.entry(address).title, reason=reason
-            )
+        _say_unread(report, output)
         details = {
             "file": str(path),
             "count": len(report.values),

@@ -20,7 +20,7 @@ from app.errors import HubsideError
 from app.model.texts import load_texts
 from app.settings import settings_from
 
-COMMANDS: Final = ("od", "twin", "bus", "recordings", "serve")
+COMMANDS: Final = ("od", "twin", "bus")
 """Modules of this package, each with ``add_parser``."""
 
 
@@ -28,13 +28,26 @@ def build_parser() -> argparse.ArgumentParser:
     """All commands with their arguments."""
     parser = argparse.ArgumentParser(prog="hubside", description="The service bench for turbine pitch drives.")
     parser.add_argument("--version", action="version", version=f"hubside {__version__}")
-    parser.add_argument("--json", action="store_true", help="results for machines")
-    parser.add_argument("--data", type=Path, metavar="DIR", help="where sets and recordings are kept")
-    parser.add_argument("--verbose", action="store_true", help="log what happens on stderr")
+    parser.set_defaults(json=False, data=None, verbose=False)
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for name in COMMANDS:
         importlib.import_module(f"app.cli.{name}").add_parser(commands)
+    _add_common(parser)
     return parser
+
+
+def _add_common(parser: argparse.ArgumentParser) -> None:
+    """The options of all commands, so that they may stand before the command or behind it."""
+    unless_given = argparse.SUPPRESS
+    parser.add_argument("--json", action="store_true", default=unless_given, help="results for machines")
+    parser.add_argument(
+        "--data", type=Path, default=unless_given, metavar="DIR", help="where sets and recordings are kept"
+    )
+    parser.add_argument("--verbose", action="store_true", default=unless_given, help="log what happens on stderr")
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for child in dict.fromkeys(action.choices.values()):
+                _add_common(child)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -7,9 +7,13 @@ from pathlib import Path
 
 from app.drivers.contract import FoundNode
 from app.errors import UsageError
+from app.model.description import Description
+from app.model.description_file import BUILTIN, load_builtin
+from app.model.eds import load_eds
 from app.model.site import BusConfig, Device, Station, Turbine, load_site
 
 BUS = "can0"
+_SHEETS = (".eds", ".dcf")
 
 
 def add_connection(parser: argparse.ArgumentParser) -> None:
@@ -20,6 +24,13 @@ def add_connection(parser: argparse.ArgumentParser) -> None:
         "--can", metavar="INTERFACE:CHANNEL[@BITRATE]", help="socketcan:can0@500000, pcan:PCAN_USBBUS1 …"
     )
     parser.add_argument("--turbine", help="which turbine of the site file, where it names several")
+    parser.add_argument(
+        "--eds",
+        action="append",
+        default=[],
+        metavar="[NODE=]FILE",
+        help="EDS or DCF of a device that has no description here; without NODE for every such device",
+    )
     parser.add_argument("--consent", action="store_true", help="go active although another master is on the bus")
     parser.add_argument("--listen-s", type=float, default=0.5, help="how long to listen before anything is sent")
     parser.add_argument("--record", action="store_true", help="record all frames meanwhile")
@@ -39,17 +50,51 @@ def site_turbine(arguments: argparse.Namespace) -> Turbine | None:
     raise UsageError(reason=f"--turbine names one of: {known}")
 
 
+def descriptions_for(arguments: argparse.Namespace, turbine: Turbine | None) -> dict[str, Description]:
+    """All descriptions that may be needed, by the id that devices name: ours, and EDS or DCF files.
+
+    A site file may name an EDS file in place of an id; its path starts at the site file. Raises DescriptionError.
+    """
+    known = {name: load_builtin(name) for name in BUILTIN}
+    if turbine is not None:
+        for device in turbine.devices:
+            if device.description_id not in known and Path(device.description_id).suffix.lower() in _SHEETS:
+                path = arguments.site.parent / device.description_id
+                known[device.description_id] = load_eds(path, device.node).description
+    for _node, path in _sheets(arguments):
+        known[str(path)] = load_eds(path).description
+    return known
+
+
+def _sheets(arguments: argparse.Namespace) -> list[tuple[int | None, Path]]:
+    pairs: list[tuple[int | None, Path]] = []
+    for text in arguments.eds:
+        node, equals, file = text.partition("=")
+        pairs.append((int(node), Path(file)) if equals and node.isdigit() else (None, Path(text)))
+    return pairs
+
+
+def _sheet_for(arguments: argparse.Namespace, node: int) -> str | None:
+    """Key of the EDS file that was given for ``node``."""
+    for wanted, path in _sheets(arguments):
+        if wanted in (node, None):
+            return str(path)
+    return None
+
+
 def bare_turbine(connection: str) -> Turbine:
     """A turbine of one bus and no known device yet."""
     return Turbine("bus", connection, (BusConfig(BUS, connection, 0),), ())
 
 
-def scanned_turbine(connection: str, found: list[FoundNode]) -> Turbine:
-    """The turbine of one bus with the devices that a scan has recognised."""
+def scanned_turbine(arguments: argparse.Namespace, found: list[FoundNode]) -> Turbine:
+    """The turbine of one bus with the devices that a scan has recognised, or that an EDS was given for."""
+    connection = arguments.can
+    described = [(one.node, one.description_id or _sheet_for(arguments, one.node)) for one in found]
     devices = tuple(
-        Device(f"bus/nodes/{one.node}", f"node {one.node}", one.description_id, BUS, one.node)
-        for one in found
-        if one.description_id is not None
+        Device(f"bus/nodes/{node}", f"node {node}", description, BUS, node)
+        for node, description in described
+        if description is not None
     )
     return Turbine("bus", connection, (BusConfig(BUS, connection, 0),), (Station("bus/nodes", "nodes", None, devices),))
 

@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import argparse
+import gc
 import signal
 import sys
 import threading
 from pathlib import Path
 
 from app.cli.output import Output
-from app.errors import UsageError
+from app.errors import BusOpenError, UsageError
+from app.model.description_file import load_builtin
+from app.twins.line import CanLine
+from app.twins.line_thread import LineThread
+from app.twins.socketcand_server import SocketcandServer
+from app.twins.turbine import build_turbine
 
 SWITCH_INTERVAL_S = 0.0005
 """Threads of this process hand over faster than Python's 5 ms, else the bus would be late by as much."""
@@ -31,28 +37,43 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 def run(arguments: argparse.Namespace, output: Output) -> int:
     """Serve until interrupted."""
     sys.setswitchinterval(SWITCH_INTERVAL_S)
+    gc.freeze()
     host, port = _address(arguments.can)
-    from app.twins.turbine import serve_oat
-
+    if arguments.bitrate <= 0 or arguments.turnaround_ms < 0:
+        raise UsageError(reason="bit rate and turnaround are positive")
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
-    with serve_oat(
-        host=host,
-        port=port,
-        bitrate=arguments.bitrate,
+    line = CanLine(arguments.bitrate)
+    turbine = build_turbine(
+        line,
+        load_builtin("oat-pmm"),
+        load_builtin("oat-pmc"),
         state_dir=arguments.state,
         turnaround_ns=round(arguments.turnaround_ms * 1e6),
         factory=arguments.factory,
-    ) as server:
-        address = f"socketcand:{host}:{server.port}"
-        if output.as_json:
-            output.result({"address": address, "devices": server.devices, "bitrate": arguments.bitrate}, "")
-        else:
-            output.say("cli.twin_ready", count=server.devices, address=address, bitrate=arguments.bitrate)
-            output.say("cli.stop_hint")
+    )
+    for problem in turbine.problems:
+        output.say("cli.twin_problem", reason=problem)
+    turbine.power_on(line.now_ns)
+    thread = LineThread(line)
+    try:
+        server = SocketcandServer(thread, host, port)
+    except OSError as error:
+        raise BusOpenError(bus=arguments.can, reason=error.strerror or str(error)) from error
+    with thread, server:
+        _announce(f"socketcand:{host}:{server.port}", len(turbine.devices), arguments.bitrate, output)
         stop.wait()
+    turbine.power_off()
     return 0
+
+
+def _announce(address: str, devices: int, bitrate: int, output: Output) -> None:
+    if output.as_json:
+        output.result({"address": address, "devices": devices, "bitrate": bitrate}, "")
+    else:
+        output.say("cli.twin_ready", count=devices, address=address, bitrate=bitrate)
+        output.say("cli.stop_hint")
 
 
 def _address(text: str) -> tuple[str, int]:

@@ -36,13 +36,14 @@ class BusLink:
     """A CANopen bus: frames go to the recorder, through the decoder into the live state, and count as bus load.
 
     ``on_frames`` runs on the driver's receive thread; ``lock`` is shared by all buses of a connection, because the live
-    state has one writer at a time.
+    state has one writer at a time. ``descriptions`` by node; ``known`` are those that a scan may recognise.
     """
 
     def __init__(
         self,
         config: BusConfig,
         descriptions: Mapping[int, Description],
+        known: Sequence[Description],
         live: LiveState,
         lock: Lock,
         stamper: Stamper,
@@ -64,7 +65,7 @@ class BusLink:
             can,
             stamper,
             config.name,
-            tuple({one.id: one for one in descriptions.values()}.values()),
+            known,
             consent=options.consent,
             listen_s=options.listen_s,
         )

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from app.drivers.contract import DriverStatus, LinkState, MasterSign
 from app.errors import UsageError
-from app.model.description import Description
+from app.model.description import Bus, Description
 from app.model.site import Device, Turbine
 from app.recording.content import RecorderClock
 from app.service.bus_link import BusLink
@@ -47,8 +47,9 @@ class Connection:
         self._clock = RecorderClock(monotonic_ns, wall_ns, self.stamper)
         self._targets = {device.slug: self._target(device, descriptions) for device in turbine.devices}
         self._lock = Lock()
+        known = tuple(one for one in descriptions.values() if one.bus is Bus.CANOPEN)
         self.buses = {
-            bus.name: BusLink(bus, self._by_node(bus.name), self.live, self._lock, self.stamper, options)
+            bus.name: BusLink(bus, self._by_node(bus.name), known, self.live, self._lock, self.stamper, options)
             for bus in turbine.buses
         }
         self.recording: Recording | None = None

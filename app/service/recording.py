@@ -84,7 +84,7 @@ class Recording:
         self.recorder.close(timeout_s)
 
     def _note(self, entry: Entry) -> None:
-        details = {key: str(value) for key, value in entry.details.items()}
+        details = {key: str(value) for key, value in entry.details.items() if key != "bus"}
         who = {"device": entry.device, "person": entry.person, "text_key": entry.text_key}
         kind = _KINDS.get(entry.kind, EventKind.NOTE)
         self.recorder.event(kind, str(entry.details.get("bus", "")), entry.t_ns, **who, **details)
