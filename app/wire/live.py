@@ -65,7 +65,7 @@ class NodeView:
     """One node now. ``state`` None: not known; ``commanded``: it was told so and has not said so itself yet.
 
     ``heartbeat_ns`` and ``boot_ns`` are the times of the latest heartbeat and boot-up. ``period_ns`` is that of 1017h
-    where known, else the interval of the last two heartbeats. ``silent``: a heartbeat is overdue. ``emcy_code`` is
+    where known, else the longest interval measured. ``silent``: a heartbeat is overdue. ``emcy_code`` is
     that of the latest emergency message, 0 after "no error". ``other_client_ns``: the latest transfer of a foreign
     SDO client.
     """
@@ -100,7 +100,7 @@ class _Node:
     """All that is kept of a node. ``seen``: it has said something itself."""
 
     __slots__ = (
-        "boot_ns", "boots", "bus", "commanded", "emcy_code", "emcy_ns", "heartbeat_ns", "interval_ns", "memory",
+        "boot_ns", "boots", "bus", "commanded", "emcy_code", "emcy_ns", "first_interval_ns", "heartbeat_ns", "interval_ns", "memory",
         "number", "other_client_ns", "period_ns", "reset_communication", "seen", "silent", "state", "version",
     )  # fmt: skip
 
@@ -113,6 +113,7 @@ class _Node:
         self.commanded = False
         self.heartbeat_ns: int | None = None
         self.interval_ns: int | None = None
+        self.first_interval_ns: int | None = None
         self.period_ns: int | None = None
         self.silent = False
         self.boot_ns: int | None = None
@@ -122,6 +123,17 @@ class _Node:
         self.other_client_ns: int | None = None
         self.reset_communication = False
         self.version = 0
+
+    def measured(self, interval_ns: int) -> None:
+        """Two heartbeats came so far apart. One interval alone says little: a change of state may send one early."""
+        if self.first_interval_ns is None:
+            self.first_interval_ns = interval_ns
+        else:
+            self.interval_ns = max(interval_ns, self.interval_ns or self.first_interval_ns)
+
+    def forget_heartbeat(self) -> None:
+        """Heartbeats start anew."""
+        self.heartbeat_ns = self.interval_ns = self.first_interval_ns = None
 
     def view(self) -> NodeView:
         return NodeView(
@@ -395,7 +407,7 @@ class LiveState:
     def _on_state(self, seen: StateSeen) -> None:
         node = self._node(seen.bus, seen.node)
         if node.heartbeat_ns is not None and not node.silent:
-            node.interval_ns = seen.t_ns - node.heartbeat_ns
+            node.measured(seen.t_ns - node.heartbeat_ns)
         node.heartbeat_ns = seen.t_ns
         if node.silent:
             node.silent = False
@@ -412,7 +424,8 @@ class LiveState:
         node.reset_communication = False
         node.state, node.commanded = NmtState.PRE_OPERATIONAL, False
         node.boot_ns, node.boots = seen.t_ns, node.boots + 1
-        node.heartbeat_ns = node.interval_ns = node.period_ns = node.emcy_code = None
+        node.period_ns = node.emcy_code = None
+        node.forget_heartbeat()
         node.silent = False
         self._see(node)
         self._touch_node(node)
@@ -432,7 +445,8 @@ class LiveState:
         for node in self._nodes.values():
             if node.bus == seen.bus:
                 self._touch_cells(node.memory.gap())
-                node.state = node.interval_ns = node.heartbeat_ns = None
+                node.state = None
+                node.forget_heartbeat()
                 if node.seen:
                     self._touch_node(node)
         kind = EventKind.GAP

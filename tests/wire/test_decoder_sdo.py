@@ -277,10 +277,11 @@ def test_noise_on_one_server_never_raises(rng: random.Random) -> None:
         for line in (*maker(A, bytes(30)), Line(True, sdo.abort(A, 1)), Line(False, sdo.abort(B, 1)))
     ]
     decoder = CanOpenDecoder(BUS)
-    for item in frames(3, rng.choices(pool, k=300)):
+    for number, item in enumerate(frames(3, rng.choices(pool, k=300))):
         for record in decoder.feed(item):
             assert record.node == 3
-        json.dumps(decoder.snapshot())
+        if number % 30 == 0:
+            json.dumps(decoder.snapshot())
 
 
 CONVERSATION = st.tuples(
@@ -302,7 +303,7 @@ def conversation(item: tuple[SdoAccess, bool, int, int, bytes, int, set[int]]) -
 
 
 @given(st.dictionaries(st.integers(1, 127), st.lists(CONVERSATION, max_size=4), max_size=4), st.randoms())
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=100, deadline=None)
 def test_interleaved_transfers_give_the_values_computed_directly(
     plan: dict[int, list[tuple[SdoAccess, bool, int, int, bytes, int, set[int]]]], rng: random.Random
 ) -> None:
@@ -313,7 +314,7 @@ def test_interleaved_transfers_give_the_values_computed_directly(
         node = rng.choice([n for n, queue in queues.items() if queue])
         line, t_ns = queues[node].pop(0), t_ns + 1
         records += decoder.feed(frame(t_ns, (0x600 if line.client else 0x580) + node, line.data))
-        if rng.random() < 0.05:  # the state goes through JSON, as in a recording
+        if rng.random() < 0.01:  # the state goes through JSON, as in a recording
             state = json.loads(json.dumps(decoder.snapshot()))
             decoder = CanOpenDecoder(BUS)
             decoder.restore(state)

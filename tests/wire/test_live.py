@@ -332,6 +332,20 @@ def test_silent_node_is_found_and_comes_back() -> None:
     ]
 
 
+def test_period_is_measured_where_1017h_was_not_seen() -> None:
+    """Two intervals at least; one heartbeat out of turn does not make a node look silent."""
+    live = LiveState()
+    for t_ms in (0, 2, 1002, 2002):
+        live.apply(StateSeen(t_ms * MS, BUS, 1, NmtState.OPERATIONAL))
+    view = live.node(BUS, 1)
+    assert view is not None and view.period_ns == 1000 * MS
+    silent = []
+    for t_ms in (3500, 3700):
+        live.tick(t_ms * MS)
+        silent.append([node.silent for node in live.nodes()])
+    assert silent == [[False], [True]]
+
+
 def test_emcy_in_the_words_of_the_device() -> None:
     description = load_builtin("oat-pmc")
     bench = Bench(11, description)
