@@ -119,13 +119,14 @@ def encode_chunk(body: Body, packer: zstandard.ZstdCompressor, with_index: bool)
         COMPRESSION.encode(),
         len(packed),
     )
-    index = _message_index(body) if with_index else b""
+    index = message_index(body) if with_index else b""
     return EncodedChunk(
         body.channel_id, head + packed, index, len(body.times), start_ns, end_ns, len(packed), len(body.data)
     )
 
 
-def _message_index(body: Body) -> bytes:
+def message_index(body: Body) -> bytes:
+    """The message index record of a body."""
     entries = np.empty(len(body.times), dtype=_INDEX_ENTRY)
     entries["log_time"] = body.times
     entries["offset"] = body.offsets

@@ -7,7 +7,6 @@ damage is an error instead.
 from __future__ import annotations
 
 import json
-import mmap
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from heapq import heapify, heappop, heapreplace
 from pathlib import Path
@@ -15,7 +14,7 @@ from types import MappingProxyType
 from typing import Final, NamedTuple, TypeVar
 
 import numpy as np
-from mcap.records import Attachment, Channel, Chunk, ChunkIndex, Metadata
+from mcap.records import Attachment, Channel, Chunk, ChunkIndex, Header, Metadata, Schema
 
 from app.errors import RecordingError
 from app.recording.cdr import (
@@ -46,18 +45,21 @@ from app.recording.content import (
 )
 from app.recording.part import Identity
 from app.recording.scan import (
+    Bytes,
     Damage,
     DamageReason,
     Scan,
     check_head,
     is_finished,
+    map_file,
     parse,
     parse_attachment,
     read_summary,
     scan,
+    unmap,
 )
 from app.recording.schemas import CAN_FRAME, CLOCK_TOPIC, EVENTS_TOPIC, STATE_TOPIC, TELEGRAM
-from app.recording.summary import Summary
+from app.recording.summary import MAGIC, Summary
 from app.wire.frame import Frame
 
 _PREFIX: Final = RECORD_PREFIX.size + MESSAGE_FIXED
@@ -108,8 +110,8 @@ class Recording:
             result = scan(self._data, self.path.name)
             summary, chunks = self._by_scan(result)
         self._chunks = sorted(chunks)
-        self._channels: Mapping[int, Channel] = summary.channels
-        self._schema_names = {schema.id: schema.name for schema in summary.schemas.values()}
+        self.channels: Mapping[int, Channel] = summary.channels
+        self.schemas: Mapping[int, Schema] = summary.schemas
         self._message_counts = summary.messages
         self._attachment_spans = [(index.offset, index.length) for index in summary.attachments]
         recording = self.metadata.get(METADATA_RECORDING, {})
@@ -156,8 +158,7 @@ class Recording:
 
     def close(self) -> None:
         """Closes the file. May be called twice."""
-        if isinstance(self._data, mmap.mmap):
-            self._data.close()
+        unmap(self._data)
 
     # What the file says about itself.
 
@@ -203,7 +204,7 @@ class Recording:
     @property
     def topics(self) -> Mapping[str, int]:
         """Number of messages by topic."""
-        return {channel.topic: self._message_counts.get(number, 0) for number, channel in self._channels.items()}
+        return {channel.topic: self._message_counts.get(number, 0) for number, channel in self.channels.items()}
 
     @property
     def span_ns(self) -> tuple[int, int] | None:
@@ -215,15 +216,42 @@ class Recording:
 
     def attachments(self) -> list[AttachedFile]:
         """The files inside the file; damaged ones are left out and listed in ``damages``."""
-        found = []
+        return [AttachedFile(record.name, record.media_type, record.data) for record in self.attachment_records()]
+
+    # Records as they stand in the file, for who writes another file of them.
+
+    @property
+    def library(self) -> str:
+        """What wrote the file, as its header says."""
+        end = len(MAGIC) + RECORD_PREFIX.size
+        length = RECORD_PREFIX.unpack(self._data[len(MAGIC) : end])[1]
+        try:
+            return parse(Header, self._data[end : end + length]).library
+        except ValueError:
+            return ""
+
+    @property
+    def metadata_records(self) -> Sequence[Metadata]:
+        """All metadata records in order."""
+        return tuple(self._metadata)
+
+    def attachment_records(self) -> Iterator[Attachment]:
+        """The attachments with their times, in order."""
         for offset, length in self._attachment_spans:
             try:
-                record: Attachment = parse_attachment(self._body(offset, length))
+                yield parse_attachment(self._body(offset, length))
             except ValueError as error:
                 self._damaged(offset, length, str(error))
-                continue
-            found.append(AttachedFile(record.name, record.media_type, record.data))
-        return found
+
+    def bodies(self) -> Iterator[tuple[Body, float]]:
+        """The content of every chunk by time, with the share of the chunks that is done, 0 to 1."""
+        for n, chunk in enumerate(self._chunks, 1):
+            try:
+                yield self._body_of(chunk), n / len(self._chunks)
+            except ValueError as error:
+                self._damaged(chunk.offset, chunk.length, str(error))
+        if self._partial is not None:
+            yield self._partial, 1.0
 
     # What was recorded.
 
@@ -258,7 +286,7 @@ class Recording:
         self, topic: str, decode: Callable[[bytes], _T], start_ns: int | None, end_ns: int | None
     ) -> Iterator[_T]:
         return self._merged(
-            lambda chunk: self._channels[chunk.channel_id].topic == topic,
+            lambda chunk: self.channels[chunk.channel_id].topic == topic,
             lambda body: ((t_ns, decode(payload)) for t_ns, payload in _payloads(body)),
             start_ns,
             end_ns,
@@ -302,8 +330,8 @@ class Recording:
             self._damaged(chunk.offset, chunk.length, str(error))
 
     def _frames_of(self, body: Body) -> Iterator[tuple[int, Frame]]:
-        channel = self._channels[body.channel_id]
-        if self._schema_names.get(channel.schema_id) == TELEGRAM.name:
+        channel = self.channels[body.channel_id]
+        if self._type_name(channel) == TELEGRAM.name:
             return ((t_ns, decode_telegram(payload)) for t_ns, payload in _payloads(body))
         layout = can_dtype(channel.topic[1:])
         stride = len(body.data) // len(body.times)
@@ -315,8 +343,12 @@ class Recording:
     # Bytes of the file.
 
     def _schema_name(self, chunk: _ChunkAt) -> str:
-        channel = self._channels.get(chunk.channel_id)
-        return "" if channel is None else self._schema_names.get(channel.schema_id, "")
+        channel = self.channels.get(chunk.channel_id)
+        return "" if channel is None else self._type_name(channel)
+
+    def _type_name(self, channel: Channel) -> str:
+        schema = self.schemas.get(channel.schema_id)
+        return "" if schema is None else schema.name
 
     def _body(self, offset: int, length: int) -> bytes:
         return self._data[offset + RECORD_PREFIX.size : offset + length]
@@ -350,12 +382,9 @@ def open_recording(path: Path, strict: bool = False) -> Recording:
     return Recording(path, strict)
 
 
-def _map(path: Path) -> bytes | mmap.mmap:
+def _map(path: Path) -> Bytes:
     try:
-        with path.open("rb") as file:
-            if path.stat().st_size == 0:
-                return b""
-            return mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+        return map_file(path)
     except OSError as error:
         raise RecordingError(file=path.name, offset=0, reason=error.strerror or str(error)) from error
 

@@ -12,6 +12,7 @@ import zlib
 from dataclasses import dataclass, field
 from enum import Enum
 from io import BytesIO
+from pathlib import Path
 from typing import Final, NamedTuple, TypeVar
 
 from mcap.data_stream import ReadDataStream
@@ -34,7 +35,7 @@ from mcap.records import (
 
 from app.errors import RecordingError
 from app.recording.cdr import RECORD_PREFIX
-from app.recording.chunks import Body, chunk_data, partial_body, split_body
+from app.recording.chunks import Body, chunk_data, message_index, partial_body, split_body
 from app.recording.summary import FOOTER_SIZE, MAGIC, Summary
 
 Bytes = bytes | mmap.mmap
@@ -100,6 +101,20 @@ class Scan:
     chunk_channels: list[int] = field(default_factory=list)
     metadata: list[Metadata] = field(default_factory=list)
     partial: Body | None = None
+
+
+def map_file(path: Path) -> Bytes:
+    """The bytes of a file without reading it into memory. Close them with ``unmap``. Raises ``OSError``."""
+    with path.open("rb") as file:
+        if path.stat().st_size == 0:
+            return b""
+        return mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+
+
+def unmap(data: Bytes) -> None:
+    """Gives a mapped file free. May be called twice."""
+    if isinstance(data, mmap.mmap):
+        data.close()
 
 
 def parse(record_type: type[_R], body: bytes) -> _R:
@@ -197,7 +212,7 @@ class _Scanner:
             result.metadata.append(metadata)
             result.summary.add_metadata(metadata, at, end - at)
         else:
-            raise ValueError("message index without its chunk")
+            raise ValueError("message index that belongs to no whole chunk")
         return end
 
     def _take_chunk(self, chunk: Chunk, at: int, end: int) -> int:
@@ -225,13 +240,9 @@ class _Scanner:
         return index_end
 
     def _message_index_end(self, body: Body, at: int) -> int:
-        """Where the message index of a chunk ends, or ``at`` where none that fits stands there."""
-        frame = self._frame(at)
-        size = 16 * len(body.times)
-        if frame is None or frame != (Opcode.MESSAGE_INDEX, at + 15 + size):
-            return at
-        channel_id, stated = struct.unpack("<HI", self._data[at + 9 : at + 15])
-        return frame[1] if (channel_id, stated) == (body.channel_id, size) else at
+        """Where the message index of a chunk ends, or ``at`` where the one that belongs to it does not stand there."""
+        expected = message_index(body)
+        return at + len(expected) if self._data[at : at + len(expected)] == expected else at
 
     def _leave_out(self, at: int, end: int, detail: str) -> int:
         """A record with a sound frame and damaged content; goes on behind it if that looks like a record again."""
