@@ -37,12 +37,12 @@ class Output:
         """The result: ``data`` as JSON for machines, ``text`` for people."""
         self.line(json.dumps(data, ensure_ascii=False) if self.as_json else text)
 
-    def say(self, key: str, **details: Any) -> None:
+    def say(self, key: str, /, **details: Any) -> None:
         """A remark on stderr."""
         self._end_progress()
         print(self.texts(key, **details), file=self._err, flush=True)
 
-    def progress(self, key: str, **details: Any) -> None:
+    def progress(self, key: str, /, **details: Any) -> None:
         """Progress on stderr: rewritten in place on a terminal, silent elsewhere."""
         if self._err.isatty():
             print(f"\r\x1b[K{self.texts(key, **details)}", end="", file=self._err, flush=True)

@@ -18,7 +18,7 @@ class Texts:
         self._texts = texts
         self._fallback = fallback
 
-    def __call__(self, key: str, **details: Any) -> str:
+    def __call__(self, key: str, /, **details: Any) -> str:
         """The text of ``key`` with its placeholders filled; a placeholder without a detail becomes a dash."""
         text = self._texts.get(key) or self._fallback.get(key) or key
         return text.format_map(_Dashes({name: str(value) for name, value in details.items()}))

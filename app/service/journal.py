@@ -73,7 +73,7 @@ class Journal:
         self._listeners: list[Callable[[Entry], None]] = []
         self._lock = Lock()
 
-    def note(self, kind: Kind, device: str | None = None, **details: Any) -> None:
+    def note(self, kind: Kind, device: str | None = None, /, **details: Any) -> None:
         """Add an event and tell everybody who listens."""
         entry = Entry(self._stamp(), kind, device, self._person, details)
         with self._lock:
