@@ -123,6 +123,7 @@ class CanPort:
         """Guards the link in use, the reopened one, and the tapped frames; held while a frame is stamped and sent."""
         self._link: CanLink | None = None
         self._reopened: CanLink | None = None
+        self._reopened_as = config
         self._tapped: list[Frame] = []
         self._soon: deque[Callable[[], None]] = deque()
         self._timers: list[tuple[int, int, Timer]] = []
@@ -349,6 +350,9 @@ class CanPort:
         _LOG.warning("%s: lost: %s", self.bus, reason)
         self._tell(PortStatus(PortState.LOST, t_ns, reason, t_ns, self._dropped))
         link.close()
+        self._start_opener()
+
+    def _start_opener(self) -> None:
         self._opener = threading.Thread(target=self._open_again, name=f"can-open-{self.bus}", daemon=True)
         self._opener.start()
 
@@ -356,8 +360,9 @@ class CanPort:
         """Runs in a thread of its own: drivers may take their time to open, and timers go on meanwhile."""
         said = ""
         while not self._stopping.is_set():
+            config = self._config
             try:
-                link = open_link(self._config, _OPEN_TIMEOUT_S)
+                link = open_link(config, _OPEN_TIMEOUT_S)
             except LinkError as error:
                 if str(error) != said:
                     said = str(error)
@@ -365,11 +370,16 @@ class CanPort:
                 self._stopping.wait(RETRY_S)
                 continue
             with self._tx_lock:
-                self._reopened = link
+                self._reopened, self._reopened_as = link, config
             self._wake()
             return
 
     def _adopt(self) -> None:
+        if self._reopened_as.listen_only != self._config.listen_only and self._config.has_silent_mode:
+            # Changed while it was being opened.
+            self._take_reopened()
+            self._start_opener()
+            return
         with self._tx_lock:
             self._link, self._reopened = self._reopened, None
         self._link_dropped = 0
