@@ -8,7 +8,6 @@ in time proportional to the changes, so that any number of readers can coalesce 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
 from threading import Lock
 from typing import Any, Final, NamedTuple
 
@@ -17,7 +16,8 @@ from app.model.description import Description
 from app.wire import sdo
 from app.wire.events import Event, EventKind, EventLog, Severity, Told, tell_emcy, tell_sdo
 from app.wire.frame import Direction
-from app.wire.memory import Cell, NodeMemory, Reading, Stored
+from app.wire.live_node import LiveNode, NodeView
+from app.wire.memory import Cell, Reading, Stored
 from app.wire.nmt import ALL_NODES, NmtCommand, NmtState
 from app.wire.records import (
     BootUpSeen,
@@ -40,6 +40,8 @@ from app.wire.records import (
 )
 from app.wire.sdo_follower import LOAD_INDEX, SAVE_INDEX
 
+__all__ = ["Changes", "LiveState", "NodeView", "ValueView"]
+
 HEARTBEAT_PRODUCER: Final = Address(0x1017)
 SILENT_FACTOR: Final = 1.5
 """A node is silent after so many heartbeat periods."""
@@ -60,31 +62,6 @@ class ValueView(NamedTuple):
     version: int
 
 
-@dataclass(frozen=True, slots=True)
-class NodeView:
-    """One node now. ``state`` None: not known; ``commanded``: it was told so and has not said so itself yet.
-
-    ``heartbeat_ns`` and ``boot_ns`` are the times of the latest heartbeat and boot-up. ``period_ns`` is that of 1017h
-    where known, else the longest interval measured. ``silent``: a heartbeat is overdue. ``emcy_code`` is
-    that of the latest emergency message, 0 after "no error". ``other_client_ns``: the latest transfer of a foreign
-    SDO client.
-    """
-
-    bus: str
-    node: int
-    state: NmtState | None = None
-    commanded: bool = False
-    heartbeat_ns: int | None = None
-    period_ns: int | None = None
-    silent: bool = False
-    boot_ns: int | None = None
-    boots: int = 0
-    emcy_code: int | None = None
-    emcy_ns: int | None = None
-    other_client_ns: int | None = None
-    version: int = 0
-
-
 class Changes(NamedTuple):
     """What changed up to ``version``. ``full``: this is everything; drop what was known before."""
 
@@ -96,65 +73,6 @@ class Changes(NamedTuple):
     events: tuple[Event, ...]
 
 
-class _Node:
-    """All that is kept of a node. ``seen``: it has said something itself."""
-
-    __slots__ = (
-        "boot_ns", "boots", "bus", "commanded", "emcy_code", "emcy_ns", "first_interval_ns", "heartbeat_ns", "interval_ns", "memory",
-        "number", "other_client_ns", "period_ns", "reset_communication", "seen", "silent", "state", "version",
-    )  # fmt: skip
-
-    def __init__(self, bus: str, number: int) -> None:
-        self.bus = bus
-        self.number = number
-        self.memory = NodeMemory(bus, number)
-        self.seen = False
-        self.state: NmtState | None = None
-        self.commanded = False
-        self.heartbeat_ns: int | None = None
-        self.interval_ns: int | None = None
-        self.first_interval_ns: int | None = None
-        self.period_ns: int | None = None
-        self.silent = False
-        self.boot_ns: int | None = None
-        self.boots = 0
-        self.emcy_code: int | None = None
-        self.emcy_ns: int | None = None
-        self.other_client_ns: int | None = None
-        self.reset_communication = False
-        self.version = 0
-
-    def measured(self, interval_ns: int) -> None:
-        """Two heartbeats came so far apart. One interval alone says little: a change of state may send one early."""
-        if self.first_interval_ns is None:
-            self.first_interval_ns = interval_ns
-        else:
-            self.interval_ns = max(interval_ns, self.interval_ns or self.first_interval_ns)
-
-    def forget_heartbeat(self) -> None:
-        """Heartbeats start anew."""
-        self.heartbeat_ns = self.interval_ns = self.first_interval_ns = None
-
-    def view(self) -> NodeView:
-        return NodeView(
-            self.bus, self.number, self.state, self.commanded, self.heartbeat_ns, self.period_ns or self.interval_ns,
-            self.silent, self.boot_ns, self.boots, self.emcy_code, self.emcy_ns, self.other_client_ns, self.version,
-        )  # fmt: skip
-
-    def snapshot(self) -> dict[str, Any]:
-        kept = {name: getattr(self, name) for name in _KEPT}
-        return {"bus": self.bus, "node": self.number, **kept, "memory": self.memory.snapshot()}
-
-    def restore(self, state: Mapping[str, Any]) -> None:
-        for name in _KEPT:
-            setattr(self, name, state[name])
-        self.state = None if state["state"] is None else NmtState(state["state"])
-        self.memory.restore(state["memory"])
-
-
-_KEPT: Final = tuple(name for name in _Node.__slots__ if name not in ("bus", "number", "memory", "version"))
-
-
 class LiveState:
     """The state of all buses. Keeps the last ``max_events`` events."""
 
@@ -164,10 +82,10 @@ class LiveState:
         self._version = 0
         self._full_since = 0
         self._t_ns = 0
-        self._nodes: dict[tuple[str, int], _Node] = {}
+        self._nodes: dict[tuple[str, int], LiveNode] = {}
         # Changed cells and nodes, the latest change last: reading backwards gives what is newer than a version.
         self._changed_cells: dict[Cell, None] = {}
-        self._changed_nodes: dict[_Node, None] = {}
+        self._changed_nodes: dict[LiveNode, None] = {}
         self._events = EventLog(max_events)
         self._handlers: dict[type, Callable[[Any], None]] = {
             ValueSeen: self._on_value,
@@ -295,16 +213,16 @@ class LiveState:
         """
         if state["snapshot"] != SNAPSHOT_VERSION:
             raise ValueError(f"snapshot version {state['snapshot']}")
-        nodes: dict[tuple[str, int], _Node] = {}
+        nodes: dict[tuple[str, int], LiveNode] = {}
         for item in state["nodes"]:
-            node = nodes[item["bus"], item["node"]] = _Node(item["bus"], item["node"])
+            node = nodes[item["bus"], item["node"]] = LiveNode(item["bus"], item["node"])
             node.restore(item)
         events = EventLog(self._max_events)
         events.restore(state["events"], self._version + 1)
         with self._lock:
             self._full_since = self._version
             for key, before in self._nodes.items():
-                nodes.setdefault(key, _Node(*key)).memory.description = before.memory.description
+                nodes.setdefault(key, LiveNode(*key)).memory.description = before.memory.description
             self._nodes, self._events, self._t_ns = nodes, events, state["t_ns"]
             self._changed_cells, self._changed_nodes = {}, {}
             self._version += 1
@@ -350,7 +268,7 @@ class LiveState:
         if told is not None and node.seen:
             self._add_event(seen.t_ns, seen.bus, seen.node, told)
 
-    def _on_unfinished_write(self, node: _Node, seen: SdoSeen) -> None:
+    def _on_unfinished_write(self, node: LiveNode, seen: SdoSeen) -> None:
         """A write whose end nobody saw, one given up by its client, or a save that broke."""
         unsure = seen.outcome in (Outcome.LOST, Outcome.BROKEN) or seen.aborted_by is Side.CLIENT
         if seen.address.major == SAVE_INDEX:
@@ -460,13 +378,13 @@ class LiveState:
 
     # -- bookkeeping -------------------------------------------------------------
 
-    def _node(self, bus: str, number: int) -> _Node:
+    def _node(self, bus: str, number: int) -> LiveNode:
         node = self._nodes.get((bus, number))
         if node is None:
-            node = self._nodes[bus, number] = _Node(bus, number)
+            node = self._nodes[bus, number] = LiveNode(bus, number)
         return node
 
-    def _see(self, node: _Node) -> None:
+    def _see(self, node: LiveNode) -> None:
         if not node.seen:
             node.seen = True
             self._touch_node(node)
@@ -481,13 +399,13 @@ class LiveState:
         for cell in cells:
             self._touch_cell(cell)
 
-    def _touch_node(self, node: _Node) -> None:
+    def _touch_node(self, node: LiveNode) -> None:
         self._version += 1
         node.version = self._version
         self._changed_nodes.pop(node, None)
         self._changed_nodes[node] = None
 
-    def _tell(self, node: _Node, t_ns: int, kind: EventKind, severity: Severity, **details: Any) -> None:
+    def _tell(self, node: LiveNode, t_ns: int, kind: EventKind, severity: Severity, **details: Any) -> None:
         self._add_event(t_ns, node.bus, node.number, Told(kind, severity, kind.text_key, details))
 
     def _add_event(self, t_ns: int, bus: str, node: int, told: Told) -> None:

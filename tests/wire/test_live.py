@@ -18,7 +18,8 @@ from app.wire import sdo
 from app.wire.decoder import CanOpenDecoder
 from app.wire.events import EventKind, Severity
 from app.wire.frame import Direction, Frame
-from app.wire.live import LiveState, NodeView, ValueView
+from app.wire.live import LiveState, ValueView
+from app.wire.live_node import NodeView
 from app.wire.memory import Reading, Stored, StoredState
 from app.wire.nmt import NmtCommand, NmtState
 from app.wire.records import Fault, MalformedSeen, Source, StateSeen, ValueSeen
@@ -274,6 +275,17 @@ def test_reset_communication_proves_communication_objects_only() -> None:
     assert bench.stored(A) is None
     assert bench.stored(COMM) == (b"\1\0", StoredState.PROVEN)
     bench.nmt(NmtCommand.RESET_NODE, 1)
+    bench.boot()
+    bench.talk(traffic.read(A, b"\1"))
+    assert bench.stored(A) == (b"\1", StoredState.PROVEN)
+
+
+def test_restart_by_itself_after_a_reset_of_the_communication_proves_all() -> None:
+    bench = Bench()
+    bench.nmt(NmtCommand.RESET_COMMUNICATION, 1)
+    bench.talk(traffic.read(A, b"\1"))
+    bench.nmt(NmtCommand.RESET_COMMUNICATION, 1)
+    bench.boot()
     bench.boot()
     bench.talk(traffic.read(A, b"\1"))
     assert bench.stored(A) == (b"\1", StoredState.PROVEN)
