@@ -39,9 +39,9 @@ class LiveNode:
     """All that is kept of a node. ``seen``: it has said something itself."""
 
     __slots__ = (
-        "boot_ns", "boots", "bus", "commanded", "emcy_code", "emcy_ns", "first_interval_ns", "heartbeat_ns", 
-        "interval_ns", "memory", "number", "other_client_ns", "period_ns", "reset_communication", "seen", "silent", "state",
-        "version",
+        "boot_ns", "boots", "bus", "commanded", "emcy_code", "emcy_ns", "first_interval_ns", "heartbeat_ns",
+        "interval_ns", "memory", "number", "other_client_ns", "period_ns", "reset_communication", "seen", "silent",
+        "state", "version",
     )  # fmt: skip
 
     def __init__(self, bus: str, number: int) -> None:
