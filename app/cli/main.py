@@ -20,7 +20,7 @@ from app.errors import HubsideError
 from app.model.texts import load_texts
 from app.settings import settings_from
 
-COMMANDS: Final = ("od", "twin", "bus")
+COMMANDS: Final = ("od", "twin", "bus", "recordings", "serve")
 """Modules of this package, each with ``add_parser``."""
 
 

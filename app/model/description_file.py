@@ -94,10 +94,15 @@ def problems(path: Path) -> list[Problem]:
 
 
 def builtin_folder() -> Path:
-    """The folder of the descriptions: beside the package in a checkout, inside it in a wheel."""
+    """The folder of the descriptions."""
+    return bundled_folder("od", "od")
+
+
+def bundled_folder(in_checkout: str, in_wheel: str) -> Path:
+    """A folder of data: inside the package in a wheel, else beside the package in a checkout."""
     package = Path(__file__).resolve().parent.parent
-    bundled = package / "_bundle" / "od"
-    return bundled if bundled.is_dir() else package.parent / "od"
+    bundled = package / "_bundle" / in_wheel
+    return bundled if bundled.is_dir() else package.parent / in_checkout
 
 
 @cache

@@ -1,0 +1,141 @@
+"""``hubside serve`` and ``hubside demo``: the page of a connected turbine."""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import contextlib
+import json
+import secrets
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import AsyncIterator, Iterator
+from pathlib import Path
+
+from app.cli.bus import SWITCH_INTERVAL_S, connected
+from app.cli.output import Output
+from app.cli.targets import add_connection
+from app.errors import BusLostError, BusOpenError
+from app.model.description_file import bundled_folder
+from app.recording.recover import recover_all
+from app.service.as_found import read_as_found, unreachable
+from app.service.connection import Connection
+from app.service.poll import Poller
+from app.settings import DEFAULT_PORT, TWIN_PORT
+
+START_S = 20.0
+
+
+def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Register both commands."""
+    serve = commands.add_parser("serve", help="serve the page of a turbine")
+    add_connection(serve)
+    serve.add_argument("--no-record", action="store_true", help="do not record")
+    serve.set_defaults(run=lambda arguments, output: _start(_serve(arguments, output)))
+    demo = commands.add_parser("demo", help="twins of three blades, and the page on them")
+    demo.add_argument("--turnaround-ms", type=float, default=1.0, help="time a twin takes to answer")
+    demo.set_defaults(run=_demo, consent=False, listen_s=0.5, eds=[], turbine=None, can=None, no_record=False)
+    for parser in (serve, demo):
+        parser.add_argument("--port", type=int, default=DEFAULT_PORT, help="loopback port of the page; 0: any free one")
+
+
+def _start(command: object) -> int:
+    sys.setswitchinterval(SWITCH_INTERVAL_S)
+    return asyncio.run(command)  # type: ignore[arg-type]
+
+
+def _demo(arguments: argparse.Namespace, output: Output) -> int:
+    """Start the twins as a process of their own, then serve their page."""
+    state = arguments.settings.data / "twins"
+    with _twins(arguments, state) as address:
+        arguments.site = _demo_site(arguments.settings.data, address)
+        return _start(_serve(arguments, output))
+
+
+@contextlib.contextmanager
+def _twins(arguments: argparse.Namespace, state: Path) -> Iterator[str]:
+    """Twins in a process of their own, on the usual port or, where that is taken, on a free one."""
+    error = ""
+    for port in (TWIN_PORT, 0):
+        command = [sys.executable, "-m", "app.cli", "twin", "oat", "--json", "--state", str(state)]
+        command += ["--can", f"socketcand:127.0.0.1:{port}", "--turnaround-ms", str(arguments.turnaround_ms)]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+            try:
+                line = process.stdout.readline() if process.stdout is not None else ""
+                if line:
+                    yield json.loads(line)["address"]
+                    return
+                error = process.stderr.read() if process.stderr is not None else ""
+            finally:
+                process.terminate()
+                process.wait(START_S)
+    raise BusOpenError(bus="twins", reason=error.strip() or "the twins did not start")
+
+
+def _demo_site(folder: Path, address: str) -> Path:
+    text = (bundled_folder("docs/sites", "sites") / "example.toml").read_text(encoding="utf-8")
+    path = folder / "demo-site.toml"
+    folder.mkdir(parents=True, exist_ok=True)
+    path.write_text(text.replace(f"socketcand:127.0.0.1:{TWIN_PORT}", address), encoding="utf-8")
+    return path
+
+
+async def _serve(arguments: argparse.Namespace, output: Output) -> int:
+    settings = arguments.settings
+    for recovery in recover_all(settings.recordings, time.time_ns()):
+        output.say("cli.recovered", file=recovery.file, frames=recovery.frames, dropped=recovery.lost_bytes)
+    stop = asyncio.Event()
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        with contextlib.suppress(NotImplementedError):  # Windows: Ctrl-C comes as KeyboardInterrupt
+            loop.add_signal_handler(number, stop.set)
+    async with (
+        connected(arguments, output, not arguments.no_record) as connection,
+        _page(arguments, output, connection),
+    ):
+        look = asyncio.create_task(_first_look(connection, settings.person, output))
+        output.say("cli.demo_data", folder=settings.data)
+        output.say("cli.stop_hint")
+        await stop.wait()
+        look.cancel()
+        await asyncio.gather(look, return_exceptions=True)
+    return 0
+
+
+async def _first_look(connection: Connection, person: str, output: Output) -> None:
+    """Read everything once, then keep polling what the screens need."""
+    try:
+        reports = await read_as_found(connection, person)
+    except* BusLostError as lost:
+        output.error(lost.exceptions[0])  # type: ignore[arg-type]
+    else:
+        for error in unreachable(reports).values():
+            output.error(error)
+    poller = Poller(connection)
+    try:
+        await asyncio.Event().wait()
+    finally:
+        await poller.close()
+
+
+@contextlib.asynccontextmanager
+async def _page(arguments: argparse.Namespace, output: Output, connection: Connection) -> AsyncIterator[None]:
+    from app.scene.hub import HubScene
+    from app.web.access import Access
+    from app.web.app import create_app
+    from app.web.serve import launch_url, open_port, port_of, serve
+
+    listener = open_port(arguments.port)
+    port = port_of(listener)
+    access = Access(time.monotonic)
+    scene = await asyncio.to_thread(HubScene, secrets.token_urlsafe(32))
+    try:
+        application = create_app(connection, access, port, scene, arguments.settings.language)
+        async with serve(application, listener):
+            url = launch_url(port, access.issue_token())
+            output.result({"url": url}, output.texts("cli.page", url=url))
+            yield
+    finally:
+        await asyncio.to_thread(scene.close)
