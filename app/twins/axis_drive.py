@@ -20,8 +20,10 @@ from app.twins.plant import AxisPlant
 CYCLE_S: Final = 0.001
 _VELOCITY_LOOP_S: Final = 0.005
 """Time constant of the closed velocity loop (estimate; 60F9h holds gains without units)."""
-_REST_RAD_S: Final = 0.05
-"""Below this the motor counts as standing (0.002 degrees/s of the blade)."""
+_REST_RAD_S: Final = 1.0
+"""Below this the motor counts as standing (0.03 degrees/s of the blade)."""
+_SETTLED_RAD_S: Final = 0.05
+"""Below this nothing is left to be controlled."""
 _CURRENT_LIMIT_SHARE: Final = 0.8
 """Share of the current limit that a stop plans with, so that the controller can follow."""
 _NO_WINDOW: Final = 0xFFFFFFFF
@@ -81,6 +83,7 @@ class AxisDrive:
         self._operating = False
         self._stop: Stop | None = None
         self._peak_s = 0.0
+        self._peak_spent = False
         self._following_s = 0.0
         self._window_s = 0.0
         self.blade = blade_scaling(store)
@@ -135,9 +138,10 @@ class AxisDrive:
     @property
     def busy(self) -> bool:
         """It needs its cycles: something moves or is to move."""
-        if not self.energised:
-            return self.plant.speed_rad_s != 0.0
-        return not self.at_rest or self._window_s < self._now.position_time_s or self._wants_to_move()
+        if self.plant.slips or not self.energised:
+            return self.plant.slips or self.plant.speed_rad_s != 0.0
+        settled = abs(self.plant.speed_rad_s) < _SETTLED_RAD_S and self.profile.velocity == 0.0
+        return not settled or self._window_s < self._now.position_time_s or self._wants_to_move()
 
     # -- commanded by the state machine --------------------------------------------------
 
@@ -322,13 +326,16 @@ class AxisDrive:
         return self._limited_torque(torque)
 
     def _limited_torque(self, torque_nm: float) -> float:
-        """Peak current for 60F6h/3, then rated current, until as much time was spent below it."""
+        """Peak current for 60F6h/3, then rated current for as long."""
         rated_nm = self.plant.constants.rated_torque_nm
-        limit = self._now.peak_torque_nm
-        if self._peak_s >= self._now.peak_time_s:
-            limit = min(limit, rated_nm)
+        limit = min(self._now.peak_torque_nm, rated_nm) if self._peak_spent else self._now.peak_torque_nm
         torque_nm = min(max(torque_nm, -limit), limit)
-        self._peak_s = self._peak_s + CYCLE_S if abs(torque_nm) > rated_nm else max(0.0, self._peak_s - CYCLE_S)
+        if abs(torque_nm) > rated_nm:
+            self._peak_s += CYCLE_S
+            self._peak_spent = self._peak_s >= self._now.peak_time_s
+        else:
+            self._peak_s = max(0.0, self._peak_s - CYCLE_S)
+            self._peak_spent = self._peak_spent and self._peak_s > 0
         return torque_nm
 
     def _watch(self) -> None:
@@ -358,7 +365,10 @@ class AxisDrive:
         return self.mode in (Mode.CYCLIC_POSITION, Mode.CYCLIC_VELOCITY)
 
     def _hold(self) -> None:
+        """Set-points at the actual values; an axis that still moves is brought to rest from its velocity."""
         self.profile.put(self.position)
+        if abs(self.plant.speed_rad_s) >= _REST_RAD_S:
+            self.profile.velocity = self.velocity
         self.targets.clear()
         self._window_s = self._now.position_time_s
         self._following_s = 0.0

@@ -122,7 +122,7 @@ class CanopenDevice:
         self._restart(t_ns)
 
     def power_off(self) -> None:
-        """Fall silent; remanent values are kept. Raises OSError where they cannot be written."""
+        """Fall silent; remanent values are kept."""
         self.memory.keep()
         self._silence()
         self.power = Power.OFF

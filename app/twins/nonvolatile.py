@@ -6,6 +6,7 @@ after the next restart.
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Iterable
 from typing import Final
 
@@ -16,6 +17,7 @@ from app.twins.object_store import Cell, Deferred, Effect, Guard, ObjectStore, R
 from app.twins.state_file import Memory, StateFile
 from app.wire.sdo import Abort
 
+_LOG: Final = logging.getLogger(__name__)
 _SAVE_INDEX: Final = 0x1010
 _LOAD_INDEX: Final = 0x1011
 _ON_COMMAND: Final = 1
@@ -70,11 +72,15 @@ class NonVolatile:
         )
 
     def keep(self) -> None:
-        """Write the remanent values to the file, if they changed. Raises OSError."""
+        """Write the remanent values to the file, if they changed. Where it fails, ``problem`` says why."""
         now = {cell.entry.address: cell.to_bytes() for cell in self._remanent}
-        if now != self.memory.remanent:
-            self.memory.remanent = now
+        if now == self.memory.remanent:
+            return
+        self.memory.remanent = now
+        try:
             self._write()
+        except OSError as error:
+            self._report(str(error))
 
     def _drop_unknown(self) -> None:
         """Leave out what the file holds of objects that the description does not have, or has in another size."""
@@ -83,7 +89,7 @@ class NonVolatile:
                 cell = self._store.find(address.major, address.minor)
                 if cell is None or (cell.size is not None and cell.size != len(data)):
                     del values[address]
-                    self.problem = f"state of {address} does not fit the description and was left out"
+                    self._report(f"state of {address} does not fit the description and was left out")
 
     def _install(self, index: int, signature: int, act: Callable[[Callable[[Entry], bool]], None]) -> None:
         categories = {
@@ -122,8 +128,12 @@ class NonVolatile:
         try:
             self._write()
         except OSError as error:
-            self.problem = str(error)
+            self._report(str(error))
             raise RefusedAccessError(Abort.HARDWARE) from error
+
+    def _report(self, problem: str) -> None:
+        self.problem = problem
+        _LOG.warning("twin's memory: %s", problem)
 
     def _write(self) -> None:
         if self._file is not None:

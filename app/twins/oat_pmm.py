@@ -125,7 +125,7 @@ class OatPmm(Application):
     # -- time -----------------------------------------------------------------------------
 
     def tick(self, t_ns: int) -> None:
-        """Decide on booster and chopper; every 100 ms on all else."""
+        """Watch voltages, decide on booster and chopper; every 100 ms on all else."""
         dt_s = (t_ns - self._last_ns) / SECOND
         self._last_ns = t_ns
         if not self._booted:
@@ -133,6 +133,7 @@ class OatPmm(Application):
         self._watch_mains(t_ns)
         self._control_booster(t_ns)
         self._control_chopper(dt_s)
+        self._watch_voltages()
         if t_ns - self._slow_ns >= _SLOW_NS:
             self._slow(t_ns)
         if t_ns - self._keep_ns >= _KEEP_NS:
@@ -146,7 +147,6 @@ class OatPmm(Application):
         moves = self._axis_moves()
         self.charger.step(dt_s)
         self.test.step(dt_s, moves)
-        self._watch_voltages()
         for place, watch in enumerate(self._watches):
             watch.step(self._temperature(place), self._sensor(place), dt_s)
         self._watch_alarm_inputs()

@@ -117,6 +117,16 @@ class AxisPlant:
         self.speed_rad_s = 0.0
         self._look_at_switches()
 
+    @property
+    def slips(self) -> bool:
+        """The load is more than friction and brake hold."""
+        return abs(self.load_torque_nm) > self._hold_nm
+
+    @property
+    def _hold_nm(self) -> float:
+        constants = self.constants
+        return constants.coulomb_torque_nm + (0.0 if self.brake_lifted else constants.brake_torque_nm)
+
     def rest(self) -> None:
         """Stand: what little speed is left is held by friction, and no power is taken."""
         self.speed_rad_s = self.power_w = 0.0
@@ -125,9 +135,8 @@ class AxisPlant:
         """Move on by ``dt_s`` under a motor torque."""
         constants = self.constants
         drive_nm = torque_nm + self.load_torque_nm - constants.viscous_nms * self.speed_rad_s
-        hold_nm = constants.coulomb_torque_nm + (0.0 if self.brake_lifted else constants.brake_torque_nm)
         speed = self.speed_rad_s + drive_nm / self._inertia_kgm2 * dt_s
-        friction = hold_nm / self._inertia_kgm2 * dt_s
+        friction = self._hold_nm / self._inertia_kgm2 * dt_s
         # Dry friction brings to rest, and never beyond.
         speed = 0.0 if abs(speed) <= friction else speed - copysign(friction, speed)
         self.shaft_rad += speed * dt_s
