@@ -47,6 +47,8 @@ class HubScene:
     """A rotor of three blades in its own 3D server. ``show`` may be called from any thread."""
 
     def __init__(self, secret: str) -> None:
+        self.secret = secret
+        """What a request must carry in ``app.scene.server.SECRET_HEADER``."""
         self._server = start_server(secret)
         self._pitch: dict[int, Any] = {}
         self._mesh: dict[int, Any] = {}
@@ -100,7 +102,7 @@ class HubScene:
         bearing = geometry.ring(geometry.ROOT_RADIUS_M * 1.05, 0.35, geometry.HUB_RADIUS_M - 0.1)
         scene.add_mesh_simple(f"{root}/bearing", bearing.vertices, bearing.faces, color=_BEARING_COLOUR)
         marks, _degrees = geometry.scale_marks(geometry.ROOT_RADIUS_M * 1.35, geometry.HUB_RADIUS_M + 0.3)
-        scene.add_line_segments(f"{root}/scale", marks, colors=_MARK_COLOUR, thickness=2.0)
+        scene.add_line_segments(f"{root}/scale", marks, colors=_MARK_COLOUR, thickness=2.0, thickness_units="screen")
         self._pitch[blade] = scene.add_frame(f"{root}/pitch", show_axes=False)
         mesh = geometry.blade()
         self._mesh[blade] = scene.add_mesh_simple(

@@ -1,0 +1,126 @@
+"""What the page is told of the link: bus, load, recording, other masters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final, Literal, Protocol
+
+from app.drivers.contract import DriverStatus, LinkState
+from app.recording.writer import RecorderState, RecorderStatus
+
+Mode = Literal["live", "twin", "none"]
+LinkName = Literal["connected", "lost", "disconnected"]
+
+_LINK: Final[Mapping[LinkState, LinkName]] = {
+    LinkState.CONNECTED: "connected",
+    LinkState.LISTENING: "connected",
+    LinkState.LOST: "lost",
+    LinkState.CLOSED: "disconnected",
+}
+_WORST_FIRST: Final = (LinkState.LOST, LinkState.CLOSED, LinkState.LISTENING, LinkState.CONNECTED)
+
+
+class Bus(Protocol):
+    """What is needed of one bus of a connection."""
+
+    @property
+    def bitrate(self) -> int:
+        """In bit/s."""
+
+    @property
+    def adapter(self) -> str:
+        """Interface and channel."""
+
+    @property
+    def frames(self) -> int:
+        """Frames since the connection was opened."""
+
+    @property
+    def status(self) -> DriverStatus:
+        """State of the link."""
+
+    def bus_load(self, now_ns: int) -> float:
+        """Load of the last second, 0..1."""
+
+
+@dataclass(frozen=True, slots=True)
+class RecordingLine:
+    """The recording: ``reason`` is a text key, given where it stands still or lost frames."""
+
+    state: Literal["on", "off", "stopped"]
+    file: str | None
+    since_ns: int | None
+    size_bytes: int
+    frames: int
+    lost: int
+    reason: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class MasterLine:
+    """Another master on the bus, and by which frame it gave itself away."""
+
+    bus: str
+    sign: str
+    can_id: int
+    t_ns: int
+    count: int
+
+
+@dataclass(frozen=True, slots=True)
+class LinkLine:
+    """The connection as a whole. With several buses: the state of the worst one, and the highest load."""
+
+    state: LinkName
+    reason: str | None
+    mode: Mode
+    bus: str
+    bitrate: int
+    load: float
+    frames: int
+    dropped: int
+    recording: RecordingLine
+    other_masters: tuple[MasterLine, ...]
+
+
+def link_line(buses: Mapping[str, Bus], recording: RecorderStatus | None, twins: bool, now_ns: int) -> LinkLine:
+    """The state of the link at ``now_ns``. ``twins``: every device says that it is simulated."""
+    known = {name: (bus, bus.status) for name, bus in buses.items()}
+    if not known:
+        return LinkLine("disconnected", None, "none", "", 0, 0.0, 0, 0, recording_line(recording), ())
+    name, (bus, status) = min(known.items(), key=lambda item: _WORST_FIRST.index(item[1][1].state))
+    masters = tuple(
+        MasterLine(each, sign.value, can_id, t_ns, count)
+        for each, (_, at) in known.items()
+        for sign, can_id, t_ns, count in at.masters
+    )
+    return LinkLine(
+        state=_LINK[status.state],
+        reason=status.reason or None,
+        mode="twin" if twins else "live",
+        bus=name,
+        bitrate=bus.bitrate,
+        load=round(min(1.0, max(each.bus_load(now_ns) for each, _ in known.values())), 3),
+        frames=sum(each.frames for each, _ in known.values()),
+        dropped=sum(at.dropped for _, at in known.values()),
+        recording=recording_line(recording),
+        other_masters=masters,
+    )
+
+
+def link_urgent(line: LinkLine) -> tuple[object, ...]:
+    """The part of the line whose change must be told at once; counters and load are not in it."""
+    recording = (line.recording.state, line.recording.reason, line.recording.lost, line.recording.file)
+    signs = tuple((master.bus, master.sign, master.can_id) for master in line.other_masters)
+    return (line.state, line.reason, line.mode, line.dropped, recording, signs)
+
+
+def recording_line(status: RecorderStatus | None) -> RecordingLine:
+    """What the recorder does; None where nothing is recorded."""
+    if status is None:
+        return RecordingLine("off", None, None, 0, 0, 0, None)
+    state: Literal["on", "stopped"] = "on" if status.state is RecorderState.RECORDING else "stopped"
+    reason = None if status.reason is None else f"recording_stopped.{status.reason.value}"
+    file = None if status.file is None else str(status.file)
+    return RecordingLine(state, file, status.since_ns, status.size_bytes, status.frames, status.lost, reason)

@@ -1,0 +1,344 @@
+"""What the page is told of the live state: nodes, axes, values, events, link. Pure: live state in, small views out.
+
+Only what was seen on the wire is in it; what is not known is None, what is old says so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, Final, Literal
+
+from app.drivers.contract import TWIN_NAME
+from app.errors import ValueTypeError
+from app.model.address import Address
+from app.model.datatypes import DataType, Raw
+from app.model.description import Entry
+from app.model.site import Station, Turbine
+from app.model.values import to_scaled
+from app.service.devices import Target, decode
+from app.service.journal import Entry as JournalEntry
+from app.wire.events import Event
+from app.wire.live import LiveState, NodeView, ValueView
+from app.wire.nmt import NmtState
+from app.wire.records import Source
+
+STALE_NS: Final = 1_000_000_000
+"""A position older than this is no longer the present one."""
+DEVICE_NAME: Final = Address(0x1008)
+STATUSWORD: Final = Address(0x6041)
+ERROR_CODE: Final = Address(0x603F)
+_POSITION: Final = (Address(0x6064), Address(0x5064))
+_DEMAND: Final = (Address(0x607A), Address(0x507A))
+_VELOCITY: Final = (Address(0x606C), Address(0x506C))
+_DC_LINK: Final = (Address(0x6079), Address(0x5079), Address(0x3063))
+_SOC: Final = (Address(0x3080),)
+_BATTERY: Final = (Address(0x3060),)
+_LARGEST_EXACT: Final = 2**53 - 1
+"""Of the integers that JSON readers in browsers keep exactly."""
+
+RawJson = int | float | str
+"""A raw value as JSON: octets as hexadecimal digits, integers beyond 2^53 as decimal digits."""
+NmtName = Literal["operational", "pre-operational", "stopped", "booting", "unknown"]
+SourceName = Literal["sdo-read", "sdo-write", "pdo", "emcy"]
+SeverityName = Literal["info", "warning", "error"]
+
+_NMT: Final[Mapping[NmtState, NmtName]] = {
+    NmtState.OPERATIONAL: "operational",
+    NmtState.PRE_OPERATIONAL: "pre-operational",
+    NmtState.STOPPED: "stopped",
+    NmtState.BOOT_UP: "booting",
+}
+_SOURCE: Final[Mapping[Source, SourceName]] = {
+    Source.SDO_READ: "sdo-read",
+    Source.SDO_WRITE: "sdo-write",
+    Source.PDO_TX: "pdo",
+    Source.PDO_RX: "pdo",
+    Source.EMCY: "emcy",
+}
+_STATES: Final = (
+    (0x4F, 0x00, "not_ready_to_switch_on"),
+    (0x4F, 0x40, "switch_on_disabled"),
+    (0x6F, 0x21, "ready_to_switch_on"),
+    (0x6F, 0x23, "switched_on"),
+    (0x6F, 0x27, "operation_enabled"),
+    (0x6F, 0x07, "quick_stop_active"),
+    (0x4F, 0x0F, "fault_reaction_active"),
+    (0x4F, 0x08, "fault"),
+)
+"""Mask, bits and name of the states that a statusword shows (CiA 402, statusword)."""
+
+
+@dataclass(frozen=True, slots=True)
+class NodeLine:
+    """One device as network management sees it. ``silent``: its heartbeat is overdue, so its state is unknown."""
+
+    device: str
+    node: int
+    nmt: NmtName
+    silent: bool
+    heartbeat_t_ns: int | None
+    heartbeat_period_ms: float | None
+    boots: int
+
+
+@dataclass(frozen=True, slots=True)
+class AxisLine:
+    """One blade. ``state`` and ``fault_text_key`` are text keys; ``fault_code`` 0 is no fault, None not known.
+
+    ``stale``: the position is not known, older than a second, or its node is silent.
+    """
+
+    station: str
+    blade: int
+    position_deg: float | None
+    position_t_ns: int | None
+    demand_deg: float | None
+    velocity_dps: float | None
+    state: str | None
+    fault_code: int | None
+    fault_text_key: str | None
+    battery_soc_pct: float | None
+    battery_v: float | None
+    dc_link_v: float | None
+    stale: bool
+
+
+@dataclass(frozen=True, slots=True)
+class StoredCell:
+    """What stands in non-volatile memory: proven by a restart, or saved and not yet proven."""
+
+    raw: RawJson
+    state: Literal["proven", "saved"]
+
+
+@dataclass(frozen=True, slots=True)
+class ValueCell:
+    """One object. Not ``known``: RAM was never seen, or not since the last boot-up; then raw, hex, t_ns are None.
+
+    ``stale``: frames were lost since, or the object's mirror was written.
+    """
+
+    raw: RawJson | None
+    hex: str | None
+    t_ns: int | None
+    source: SourceName | None
+    stored: StoredCell | None
+    known: bool
+    stale: bool
+
+
+@dataclass(frozen=True, slots=True)
+class EventLine:
+    """One event; ``details`` fill the placeholders of the text, those that end in ``_key`` are text keys."""
+
+    t_ns: int
+    severity: SeverityName
+    device: str | None
+    text_key: str
+    details: Mapping[str, Any]
+
+
+# -- nodes -------------------------------------------------------------------------
+
+
+def node_lines(targets: Iterable[Target], live: LiveState) -> tuple[NodeLine, ...]:
+    """All devices in the order of ``targets``, also those that never said anything."""
+    return tuple(_node_line(target, live.node(target.device.bus, target.node)) for target in targets)
+
+
+def _node_line(target: Target, view: NodeView | None) -> NodeLine:
+    if view is None:
+        return NodeLine(target.slug, target.node, "unknown", False, None, None, 0)
+    nmt: NmtName = "unknown" if view.state is None or view.silent else _NMT[view.state]
+    period_ms = None if view.period_ns is None else round(view.period_ns / 1e6, 1)
+    return NodeLine(target.slug, target.node, nmt, view.silent, view.heartbeat_ns, period_ms, view.boots)
+
+
+def nodes_urgent(lines: Iterable[NodeLine]) -> tuple[Any, ...]:
+    """The part of the lines whose change must be told at once; heartbeat times are not in it."""
+    return tuple((line.device, line.nmt, line.silent, line.boots) for line in lines)
+
+
+def device_state(target: Target) -> str | None:
+    """Text key of the state that a device is in: of its axis where it has one, else of network management."""
+    status = target.lookup(STATUSWORD)
+    if isinstance(status, int):
+        return axis_state(status)
+    view = target.live.node(target.device.bus, target.node)
+    return None if view is None or view.state is None else view.state.text_key
+
+
+def all_twins(targets: Iterable[Target]) -> bool:
+    """True where every device has said that it is simulated."""
+    names = [target.lookup(DEVICE_NAME) for target in targets]
+    return bool(names) and all(isinstance(name, str) and name.startswith(TWIN_NAME) for name in names)
+
+
+# -- axes --------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class _Seen:
+    number: float
+    t_ns: int
+    stale: bool
+
+
+def axis_lines(turbine: Turbine, targets: Mapping[str, Target], now_ns: int) -> tuple[AxisLine, ...]:
+    """One line a blade, in the order of the site file. ``targets`` by slug."""
+    lines = []
+    for station in turbine.stations:
+        if station.blade is not None:
+            devices = [targets[device.slug] for device in station.devices if device.slug in targets]
+            lines.append(_axis_line(station, station.blade, devices, now_ns))
+    return tuple(lines)
+
+
+def _axis_line(station: Station, blade: int, devices: list[Target], now_ns: int) -> AxisLine:
+    position = _latest(devices, _POSITION)
+    code, text_key = _fault(devices)
+    return AxisLine(
+        station=station.slug,
+        blade=blade,
+        position_deg=_number(position),
+        position_t_ns=None if position is None else position.t_ns,
+        demand_deg=_number(_latest(devices, _DEMAND)),
+        velocity_dps=_number(_latest(devices, _VELOCITY)),
+        state=next((axis_state(raw) for raw in _lookups(devices, STATUSWORD) if isinstance(raw, int)), None),
+        fault_code=code,
+        fault_text_key=text_key,
+        battery_soc_pct=_number(_latest(devices, _SOC)),
+        battery_v=_number(_latest(devices, _BATTERY)),
+        dc_link_v=_number(_latest(devices, _DC_LINK)),
+        stale=position is None or position.stale or now_ns - position.t_ns > STALE_NS,
+    )
+
+
+def axis_state(status: int) -> str | None:
+    """Text key of the state in a statusword; None for bits that no state has."""
+    return next((f"axis_state.{name}" for mask, bits, name in _STATES if status & mask == bits), None)
+
+
+def _lookups(devices: Iterable[Target], address: Address) -> Iterable[Raw | None]:
+    return (device.lookup(address) for device in devices)
+
+
+def _latest(devices: Iterable[Target], addresses: Iterable[Address]) -> _Seen | None:
+    """The newest reading of one quantity, whichever device and mirror object gave it."""
+    found = [seen for device in devices for address in addresses if (seen := _seen(device, address)) is not None]
+    return max(found, key=lambda seen: seen.t_ns, default=None)
+
+
+def _seen(device: Target, address: Address) -> _Seen | None:
+    entry = device.description.entries.get(address)
+    if entry is None:
+        return None
+    view = device.live.value(device.device.bus, device.node, address)
+    if view is None or view.reading is None:
+        return None
+    scaled = to_scaled(entry, decode(entry, view.reading.data), device.lookup)
+    if scaled is None:
+        return None
+    number = float(scaled.number) / (1000 if scaled.unit.startswith("m") and len(scaled.unit) > 1 else 1)
+    node = device.live.node(device.device.bus, device.node)
+    return _Seen(round(number, 4), view.reading.t_ns, view.stale or (node is not None and node.silent))
+
+
+def _number(seen: _Seen | None) -> float | None:
+    return None if seen is None else seen.number
+
+
+def _fault(devices: Iterable[Target]) -> tuple[int | None, str | None]:
+    """The error code of the first device that has one, by its error code object or its latest emergency message."""
+    known = None
+    for device in devices:
+        code = _error_code(device)
+        if code is None:
+            continue
+        if code:
+            error = device.description.errors.get(code)
+            return code, None if error is None else error.text_key
+        known = 0
+    return known, None
+
+
+def _error_code(device: Target) -> int | None:
+    bus, node = device.device.bus, device.node
+    view, value = device.live.node(bus, node), device.live.value(bus, node, ERROR_CODE)
+    read_ns = -1 if value is None or value.reading is None else value.reading.t_ns
+    if view is not None and view.emcy_code is not None and (view.emcy_ns or 0) > read_ns:
+        return view.emcy_code
+    raw = device.lookup(ERROR_CODE)
+    return raw if isinstance(raw, int) else None
+
+
+# -- values ------------------------------------------------------------------------
+
+
+def value_cells(target: Target, views: Iterable[ValueView]) -> dict[str, ValueCell]:
+    """The views that belong to ``target``, by address."""
+    place = (target.device.bus, target.node)
+    entries = target.description.entries
+    return {
+        view.address.short: value_cell(entries.get(view.address), view)
+        for view in views
+        if (view.bus, view.node) == place
+    }
+
+
+def value_cell(entry: Entry | None, view: ValueView) -> ValueCell:
+    """One object; without an entry its bytes are told as they are."""
+    stored = None
+    if view.stored is not None:
+        state: Literal["proven", "saved"] = "proven" if view.stored.state.value == "proven" else "saved"
+        stored = StoredCell(_raw(entry, view.stored.data), state)
+    reading = view.reading
+    if reading is None:
+        return ValueCell(None, None, None, None, stored, False, view.stale)
+    raw = _raw(entry, reading.data)
+    return ValueCell(raw, reading.data.hex(), reading.t_ns, _SOURCE[reading.source], stored, True, view.stale)
+
+
+def _raw(entry: Entry | None, data: bytes) -> RawJson:
+    return raw_to_json(data if entry is None else decode(entry, data))
+
+
+def raw_to_json(raw: Raw) -> RawJson:
+    """A raw value for JSON."""
+    if isinstance(raw, bytes):
+        return raw.hex()
+    return str(raw) if isinstance(raw, int) and abs(raw) > _LARGEST_EXACT else raw
+
+
+def raw_from_json(entry: Entry, raw: RawJson) -> Raw:
+    """A raw value as JSON brought it. Raises ValueTypeError where a text is none of the entry's type."""
+    if not isinstance(raw, str) or entry.type in (DataType.VISIBLE_STRING, DataType.UNICODE_STRING):
+        return raw
+    try:
+        return int(raw) if entry.type.is_integer else bytes.fromhex(raw)
+    except ValueError as error:
+        reason = "no integer" if entry.type.is_integer else "no hexadecimal bytes"
+        raise ValueTypeError(
+            address=entry.address.short, name=entry.title, type=entry.type.name, value=raw, reason=reason
+        ) from error
+
+
+# -- events ------------------------------------------------------------------------
+
+
+def event_of_wire(event: Event, slugs: Mapping[tuple[str, int], str]) -> EventLine:
+    """An event that the decoder saw; ``slugs`` by bus and node."""
+    details = dict(event.details) | ({"repeats": event.repeats} if event.repeats else {})
+    device = slugs.get((event.bus, event.node))
+    if device is None and event.node:
+        details["node"] = event.node
+    return EventLine(event.t_ns, event.severity.value, device, event.text_key, details)
+
+
+def event_of_journal(entry: JournalEntry) -> EventLine:
+    """An event of the journal: what a person did, or what became of the link."""
+    details = {
+        name: detail if isinstance(detail, int | float) else str(detail) for name, detail in entry.details.items()
+    }
+    return EventLine(entry.t_ns, entry.kind.severity.value, entry.device, entry.text_key, details)

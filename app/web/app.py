@@ -1,0 +1,80 @@
+"""The server's application: guard, API, socket, 3D proxy, page."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+from fastapi import FastAPI, Request, Response, WebSocket
+
+from app import __version__
+from app.model.texts import load_texts
+from app.scene.hub import HubScene
+from app.service.jobs import Jobs
+from app.service.scene_feed import run_scene
+from app.web import problem
+from app.web.access import Access
+from app.web.bench import Bench
+from app.web.guard import Guard
+from app.web.problem import NotFoundError
+from app.web.routes import router
+from app.web.socket import serve_client
+from app.web.static import PageFiles, page_folder
+from app.web.viser_proxy import viser_router
+
+
+def create_app(
+    bench: Bench,
+    access: Access,
+    port: int,
+    scene: HubScene | None = None,
+    language: str = "en",
+    page: Path | None = None,
+) -> Guard:
+    """The guarded application. ``port`` is the one that it will listen on; ``page`` is the folder of the built page."""
+    app = create_api(bench, scene, language)
+    files = PageFiles(page or page_folder())
+
+    @app.websocket("/api/ws")
+    async def socket(websocket: WebSocket) -> None:
+        await serve_client(websocket, bench, time.monotonic)
+
+    if scene is not None:
+        app.include_router(viser_router(scene))
+
+    @app.get("/{path:path}", include_in_schema=False)
+    async def page_file(request: Request, path: str) -> Response:
+        answer = None if path.startswith(("api/", "viser")) else files.answer(request, path)
+        if answer is None:
+            raise NotFoundError(what=request.url.path)
+        return answer
+
+    return Guard(app, access, port, load_texts(language)("error.unauthorised"))
+
+
+def create_api(bench: Bench | None, scene: HubScene | None = None, language: str = "en") -> FastAPI:
+    """The HTTP API alone; ``bench`` None serves only to write down the API's types."""
+
+    @asynccontextmanager
+    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        app.state.jobs = Jobs()
+        async with run_scene(bench, scene):
+            yield
+        await app.state.jobs.close()
+
+    app = FastAPI(
+        title="Hubside",
+        version=__version__,
+        lifespan=lifespan,
+        docs_url=None,
+        redoc_url=None,
+        openapi_url=None,
+        generate_unique_id_function=lambda route: route.name,
+    )
+    app.state.bench = bench
+    app.state.language = language
+    app.include_router(router)
+    problem.install(app)
+    return app

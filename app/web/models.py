@@ -1,0 +1,248 @@
+"""The types of the HTTP API and of the socket. The page's types are generated from these."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, StrictFloat, StrictInt, StrictStr
+
+from app.service.link import LinkLine, Mode
+from app.service.views import AxisLine, EventLine, NodeLine, RawJson, ValueCell
+
+Language = Literal["en", "de"]
+API_VERSION: Literal[1] = 1
+
+
+class Problem(BaseModel):
+    """What went wrong (RFC 9457): ``text_key`` with ``details`` is the operator's text."""
+
+    type: str
+    title: str
+    status: int
+    code: str
+    text_key: str
+    details: dict[str, Any]
+    device_state: str | None
+
+
+class Session(BaseModel):
+    """Who is served, and in which languages."""
+
+    version: str
+    role: Literal["viewer", "technician", "expert"]
+    languages: list[Language]
+    locale: Language
+
+
+class DeviceRef(BaseModel):
+    """One device: ``slug`` is its whole path."""
+
+    slug: str
+    node: int
+    description_id: str
+    name: str
+
+
+class StationRef(BaseModel):
+    """A blade, or a bench (``blade`` null)."""
+
+    slug: str
+    name: str
+    blade: int | None
+    devices: list[DeviceRef]
+
+
+class BusRef(BaseModel):
+    """The bus; ``interface`` is the adapter as it was named."""
+
+    name: str
+    bitrate: int
+    interface: str
+
+
+class Turbine(BaseModel):
+    """The connected turbine."""
+
+    slug: str
+    name: str
+    mode: Mode
+    bus: BusRef
+    stations: list[StationRef]
+
+
+class ReadRequest(BaseModel):
+    """``addresses`` null reads all readable objects."""
+
+    addresses: Annotated[list[str], Field(max_length=10_000)] | None = None
+
+
+class WriteRequest(BaseModel):
+    """``raw``: a number, a text, or octets as hexadecimal digits."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    address: str
+    raw: StrictInt | StrictFloat | Annotated[StrictStr, Field(max_length=65_536)]
+
+
+class Nothing(BaseModel):
+    """An empty object: the request needs nothing more."""
+
+
+class Failure(BaseModel):
+    """What did not succeed, and why. ``address`` is empty where it is about the whole job."""
+
+    address: str
+    code: str
+    text_key: str
+    details: dict[str, Any]
+
+
+class JobDoc(BaseModel):
+    """Work that runs in the background. ``error`` says why it failed as a whole."""
+
+    id: str
+    kind: str
+    device: str
+    state: Literal["running", "done", "failed", "cancelled"]
+    done: int
+    total: int
+    failed: list[Failure]
+    error: Failure | None
+
+
+class WriteDone(BaseModel):
+    """A write that was verified, or whose description proves it by other means (``verified`` false)."""
+
+    address: str
+    sent_raw: RawJson
+    read_raw: RawJson | None
+    verified: bool
+    was_raw: RawJson | None
+    t_ns: int
+
+
+class SaveDone(BaseModel):
+    """The device acknowledged the save."""
+
+    t_ns: int
+    took_s: float
+
+
+class RestartDone(BaseModel):
+    """The device has booted again."""
+
+    boot_up_t_ns: int
+    took_s: float
+
+
+class AxisDone(BaseModel):
+    """STOP or FEATHER at one axis. ``confirmed_t_ns`` null: sent, and nothing more is known."""
+
+    device: str
+    sent_t_ns: int
+    confirmed_t_ns: int | None
+    how: Literal["rpdo", "sdo", "failed"]
+    error: Failure | None
+
+
+class StopDone(BaseModel):
+    """STOP or FEATHER at all axes."""
+
+    axes: list[AxisDone]
+
+
+# -- the socket ----------------------------------------------------------------------
+
+
+class Hello(BaseModel):
+    """The first message of a connection."""
+
+    version: str
+    server_t_ns: int
+
+
+class ValuesData(BaseModel):
+    """Objects of one device by address. ``full``: these are all, drop what was known before."""
+
+    device: str
+    full: bool
+    values: dict[str, ValueCell]
+
+
+class _Envelope(BaseModel):
+    """``seq`` counts the messages of one connection; ``t_ns`` is the bench's time when it was sent."""
+
+    v: Literal[1] = API_VERSION
+    ctx: Literal["live"] = "live"
+    seq: int
+    t_ns: int
+
+
+class HelloMessage(_Envelope):
+    """The connection stands."""
+
+    type: Literal["hello"] = "hello"
+    data: Hello
+
+
+class HeartbeatMessage(_Envelope):
+    """Nothing new, but the bench is there. Every quarter of a second."""
+
+    type: Literal["heartbeat"] = "heartbeat"
+    data: Nothing = Nothing()
+
+
+class LinkMessage(_Envelope):
+    """Topic ``link``: once a second, and at once where the state changes."""
+
+    type: Literal["link"] = "link"
+    data: LinkLine
+
+
+class NodesMessage(_Envelope):
+    """Topic ``nodes``: all devices, where one changed."""
+
+    type: Literal["nodes"] = "nodes"
+    data: tuple[NodeLine, ...]
+
+
+class AxesMessage(_Envelope):
+    """Topic ``axes``: all blades, where one changed, at most 20 times a second and at least once."""
+
+    type: Literal["axes"] = "axes"
+    data: tuple[AxisLine, ...]
+
+
+class ValuesMessage(_Envelope):
+    """Topic ``values:<slug>``: all that is known, then what changed."""
+
+    type: Literal["values"] = "values"
+    data: ValuesData
+
+
+class EventMessage(_Envelope):
+    """Topic ``events``: the latest hundreds, then each as it comes."""
+
+    type: Literal["event"] = "event"
+    data: EventLine
+
+
+ServerMessage = Annotated[
+    HelloMessage | HeartbeatMessage | LinkMessage | NodesMessage | AxesMessage | ValuesMessage | EventMessage,
+    Field(discriminator="type"),
+]
+"""What the socket sends."""
+
+
+class Subscribe(BaseModel):
+    """What the page wants to hear; replaces what it wanted before."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    type: Literal["subscribe"]
+    topics: Annotated[list[Annotated[str, Field(max_length=200)]], Field(max_length=200)]
+
+
+ClientMessage = Subscribe
+"""What the socket takes."""

@@ -1,0 +1,139 @@
+"""Errors as the page gets them: application/problem+json (RFC 9457) with code, text key, details and device state."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping
+from decimal import Decimal
+from enum import Enum
+from http import HTTPStatus
+from typing import Any, ClassVar, Final
+
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import JSONResponse
+from starlette.exceptions import HTTPException
+
+from app import errors
+from app.errors import HubsideError
+from app.web.models import Problem
+
+log = logging.getLogger(__name__)
+
+MEDIA_TYPE: Final = "application/problem+json"
+
+_STATUS: Final[tuple[tuple[type[HubsideError], HTTPStatus], ...]] = (
+    (errors.UnknownObjectError, HTTPStatus.NOT_FOUND),
+    (errors.PreconditionError, HTTPStatus.CONFLICT),
+    (errors.ConsentError, HTTPStatus.CONFLICT),
+    (errors.RefusedError, HTTPStatus.UNPROCESSABLE_ENTITY),
+    (errors.UsageError, HTTPStatus.BAD_REQUEST),
+    (errors.BusLostError, HTTPStatus.SERVICE_UNAVAILABLE),
+    (errors.BusOpenError, HTTPStatus.SERVICE_UNAVAILABLE),
+    (errors.NoAnswerError, HTTPStatus.GATEWAY_TIMEOUT),
+    (errors.DeviceError, HTTPStatus.BAD_GATEWAY),
+    (errors.ProtocolError, HTTPStatus.BAD_GATEWAY),
+    (errors.UnverifiedError, HTTPStatus.BAD_GATEWAY),
+)
+"""The first that fits counts. 4xx: nothing was sent; 502 to 504: it was, and something on the bus went wrong."""
+
+
+class NotFoundError(errors.RefusedError):
+    """The address names nothing. Details: what."""
+
+    code: ClassVar[str] = "not_found"
+
+
+class UnauthorisedError(errors.RefusedError):
+    """No session: the printed address must be opened first."""
+
+    code: ClassVar[str] = "unauthorised"
+
+
+class ForbiddenHostError(errors.RefusedError):
+    """Asked under a name, or from a page, that is not ours. Details: host, origin."""
+
+    code: ClassVar[str] = "forbidden_host"
+
+
+class InvalidRequestError(errors.RefusedError):
+    """The request cannot be understood. Details: reason."""
+
+    code: ClassVar[str] = "invalid"
+
+
+_OWN_STATUS: Final[Mapping[type[HubsideError], HTTPStatus]] = {
+    NotFoundError: HTTPStatus.NOT_FOUND,
+    UnauthorisedError: HTTPStatus.UNAUTHORIZED,
+    ForbiddenHostError: HTTPStatus.FORBIDDEN,
+    InvalidRequestError: HTTPStatus.UNPROCESSABLE_ENTITY,
+}
+
+
+def status_of(error: HubsideError) -> HTTPStatus:
+    """The HTTP status of an error of ours."""
+    own = _OWN_STATUS.get(type(error))
+    if own is not None:
+        return own
+    return next((status for kind, status in _STATUS if isinstance(error, kind)), HTTPStatus.INTERNAL_SERVER_ERROR)
+
+
+def problem_of(error: HubsideError, status: HTTPStatus | None = None, device_state: str | None = None) -> Problem:
+    """The document of an error; ``device_state`` is a text key."""
+    status = status or status_of(error)
+    return Problem(
+        type=f"urn:hubside:error:{error.code}",
+        title=status.phrase,
+        status=status.value,
+        code=error.code,
+        text_key=error.text_key,
+        details={name: jsonable(detail) for name, detail in error.details.items()},
+        device_state=device_state,
+    )
+
+
+def jsonable(detail: Any) -> Any:
+    """A detail as JSON carries it: bytes as hexadecimal digits, enumerations as their value, all else as text."""
+    if detail is None or isinstance(detail, bool | int | float | str):
+        return detail
+    if isinstance(detail, bytes):
+        return detail.hex(" ")
+    if isinstance(detail, Enum):
+        return jsonable(detail.value)
+    if isinstance(detail, Decimal):
+        return int(detail) if detail == int(detail) else float(detail)
+    if isinstance(detail, Mapping):
+        return {str(key): jsonable(item) for key, item in detail.items()}
+    if isinstance(detail, list | tuple | set | frozenset):
+        return [jsonable(item) for item in detail]
+    return str(detail)
+
+
+def response_of(problem: Problem) -> JSONResponse:
+    """The answer that carries a problem."""
+    return JSONResponse(problem.model_dump(), problem.status, media_type=MEDIA_TYPE)
+
+
+def install(app: FastAPI) -> None:
+    """Have every error answered as a problem; defects of ours are logged with their traceback and named as such."""
+
+    @app.exception_handler(HubsideError)
+    async def refused(request: Request, error: HubsideError) -> JSONResponse:
+        state = getattr(request.state, "device_state", None)
+        return response_of(problem_of(error, device_state=state() if callable(state) else None))
+
+    @app.exception_handler(RequestValidationError)
+    async def invalid(_request: Request, error: RequestValidationError) -> JSONResponse:
+        reason = "; ".join(f"{'.'.join(str(part) for part in one['loc'])}: {one['msg']}" for one in error.errors())
+        return response_of(problem_of(InvalidRequestError(reason=reason)))
+
+    @app.exception_handler(HTTPException)
+    async def plain(request: Request, error: HTTPException) -> JSONResponse:
+        status = HTTPStatus(error.status_code)
+        own = NotFoundError(what=request.url.path) if status is HTTPStatus.NOT_FOUND else None
+        return response_of(problem_of(own or InvalidRequestError(reason=status.phrase), status))
+
+    @app.exception_handler(Exception)
+    async def defect(request: Request, error: Exception) -> JSONResponse:
+        log.error("%s %s failed", request.method, request.url.path, exc_info=error)
+        return response_of(problem_of(HubsideError(reason=type(error).__name__)))

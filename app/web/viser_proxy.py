@@ -1,0 +1,138 @@
+"""The 3D view under ``/viser``: the client's page and its socket, passed on to the 3D server behind our guard.
+
+The 3D server answers only to the secret that is added here. Its page is shown bare: nothing but the canvas.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+from typing import Final
+
+import httpx
+import websockets
+from fastapi import APIRouter, Request, Response, WebSocket, WebSocketDisconnect
+from fastapi.responses import RedirectResponse
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.typing import Subprotocol
+
+from app.scene.hub import HubScene
+from app.scene.server import SECRET_HEADER
+from app.web.problem import NotFoundError
+
+log = logging.getLogger(__name__)
+
+TIMEOUT_S: Final = 10.0
+_UPSTREAM: Final = "127.0.0.1"
+BARE: Final = """<style>
+html, body, #root { height: 100%; margin: 0; overflow: hidden; }
+body :not(canvas):not(:has(canvas)):not(style):not(script) { display: none !important; }
+</style><script>
+// The client reconnects only while its window has the focus, which a docked frame seldom has.
+Document.prototype.hasFocus = () => true;
+</script>"""
+"""Put into the client's page. The rule names no class of the client, for they change with every version: whatever
+neither is nor holds a canvas (control panel, notices, dialogs) is not shown."""
+
+
+def viser_router(scene: HubScene) -> APIRouter:
+    """The routes of one 3D server."""
+    proxy = _Proxy(scene)
+    router = APIRouter(include_in_schema=False)
+    router.add_api_route("/viser", proxy.with_slash, methods=["GET"])
+    router.add_api_route("/viser/{path:path}", proxy.page, methods=["GET"])
+    # The client drops the trailing slash of its own address; proxies and people add it.
+    router.add_api_websocket_route("/viser", proxy.socket)
+    router.add_api_websocket_route("/viser/", proxy.socket)
+    return router
+
+
+class _Proxy:
+    def __init__(self, scene: HubScene) -> None:
+        self._scene = scene
+
+    async def with_slash(self, request: Request) -> Response:
+        query = f"?{request.url.query}" if request.url.query else ""
+        return RedirectResponse(f"/viser/{query}", 307)
+
+    async def page(self, request: Request, path: str) -> Response:
+        """A file of the client, as the 3D server has it; compressed where the browser takes that."""
+        url = f"http://{_UPSTREAM}:{self._scene.port}/{path}"
+        headers = {SECRET_HEADER: self._scene.secret, "Accept-Encoding": "identity"}
+        async with httpx.AsyncClient(trust_env=False, timeout=TIMEOUT_S) as client:
+            answer = await client.get(url, headers=headers)
+        if answer.status_code != 200:
+            raise NotFoundError(what=request.url.path)
+        media_type = answer.headers.get("content-type", "application/octet-stream")
+        body = _bare(answer.content) if media_type.startswith("text/html") else answer.content
+        return Response(body, media_type=media_type, headers={"Cache-Control": "no-store"})
+
+    async def socket(self, socket: WebSocket) -> None:
+        """Pass frames on in both directions until either side closes. Frames may be of any size."""
+        offered = [Subprotocol(name) for name in socket.scope.get("subprotocols", [])]
+        url = f"ws://{_UPSTREAM}:{self._scene.port}/"
+        try:
+            upstream = await connect(
+                url,
+                subprotocols=offered or None,
+                additional_headers={SECRET_HEADER: self._scene.secret},
+                max_size=None,
+                compression=None,
+                proxy=None,
+                open_timeout=TIMEOUT_S,
+            )
+        except (OSError, TimeoutError, websockets.InvalidHandshake) as error:
+            log.warning("the 3D server does not answer: %s", error)
+            await socket.close(1013, "the 3D server does not answer")
+            return
+        async with upstream:
+            await socket.accept(upstream.subprotocol)
+            await _pass_on(socket, upstream)
+
+
+def _bare(page: bytes) -> bytes:
+    """The client's page with our rules at the end of its head."""
+    head, mark, rest = page.partition(b"<head>")
+    return head + mark + BARE.encode() + rest
+
+
+async def _pass_on(socket: WebSocket, upstream: ClientConnection) -> None:
+    tasks = [asyncio.create_task(_up(socket, upstream)), asyncio.create_task(_down(socket, upstream))]
+    try:
+        done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+        for task in done:
+            task.result()
+    except WebSocketDisconnect:
+        log.debug("a 3D view went away")
+    except websockets.ConnectionClosed as closed:
+        with contextlib.suppress(RuntimeError):  # both sides closed at once
+            await socket.close(_code(closed), "")
+    finally:
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+
+async def _up(socket: WebSocket, upstream: ClientConnection) -> None:
+    while True:
+        message = await socket.receive()
+        if message["type"] == "websocket.disconnect":
+            raise WebSocketDisconnect(message.get("code", 1005))
+        data = message.get("bytes")
+        await upstream.send(data if data is not None else message["text"])
+
+
+async def _down(socket: WebSocket, upstream: ClientConnection) -> None:
+    while True:
+        data = await upstream.recv()
+        if isinstance(data, bytes):
+            await socket.send_bytes(data)
+        else:
+            await socket.send_text(data)
+
+
+def _code(closed: websockets.ConnectionClosed) -> int:
+    """The close code to pass on; the codes that never travel (no status, abnormal) become "going away"."""
+    code = closed.rcvd.code if closed.rcvd is not None else 1001
+    return 1001 if code in (1005, 1006, 1015) else code
