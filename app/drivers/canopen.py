@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from typing import Any, Final, TypeVar
 
 from app.drivers import scan as scanning
@@ -67,6 +68,7 @@ class CanOpenDriver:
         self._consent = consent
         self._listen_s = listen_s
         self._listening = False
+        self._on_connected: Callable[[], object] | None = None
         self._masters_before: tuple[MasterSign, ...] = ()
         self._pending: set[asyncio.Future[Any]] = set()
         self._timeouts_ns: dict[int, dict[Address, int]] = {}
@@ -84,7 +86,9 @@ class CanOpenDriver:
         """
         self._listening = True
         try:
+            connected = self._next_connection()
             await asyncio.to_thread(self._port.open, timeout_s)
+            await self._wait_for(connected, timeout_s)
             await asyncio.sleep(self._listen_s)
             self._masters_before = tuple(dict.fromkeys(seen.sign for seen in self.watch.masters))
             if not self._config.listen_only:
@@ -93,21 +97,27 @@ class CanOpenDriver:
             self._listening = False
 
     async def _go_active(self, timeout_s: float) -> None:
+        """Leave the silent mode; an adapter that has one is opened anew for that."""
         if not self._config.has_silent_mode:
             self._port.set_listen_only(False)
             return
-        loop, back = asyncio.get_running_loop(), asyncio.Event()
-
-        def on_status(status: PortStatus) -> None:
-            if status.state is PortState.CONNECTED:
-                loop.call_soon_threadsafe(back.set)
-
-        self._port.add_status_listener(on_status)
+        connected = self._next_connection()
         self._port.set_listen_only(False)
+        await self._wait_for(connected, timeout_s)
+
+    def _next_connection(self) -> asyncio.Event:
+        """An event of this loop that is set when the port connects next."""
+        loop, event = asyncio.get_running_loop(), asyncio.Event()
+        self._on_connected = partial(loop.call_soon_threadsafe, event.set)
+        return event
+
+    async def _wait_for(self, connected: asyncio.Event, timeout_s: float) -> None:
         try:
-            await asyncio.wait_for(back.wait(), timeout_s)
+            await asyncio.wait_for(connected.wait(), timeout_s)
         except TimeoutError:
-            raise BusLostError(bus=self.bus, reason="the adapter did not come back from its silent mode") from None
+            raise BusLostError(bus=self.bus, reason=f"the adapter was not ready within {timeout_s} s") from None
+        finally:
+            self._on_connected = None
 
     async def close(self, timeout_s: float = 5.0) -> None:
         """End all that runs with BusLostError and close the adapter. Once closed, it stays closed."""
@@ -167,6 +177,9 @@ class CanOpenDriver:
         }
 
     def _on_status(self, status: PortStatus) -> None:
+        on_connected = self._on_connected
+        if status.state is PortState.CONNECTED and on_connected is not None:
+            on_connected()
         if status.state is PortState.LOST:
             self._client.lose(BusLostError(bus=self.bus, reason=status.reason))
 

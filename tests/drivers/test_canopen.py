@@ -12,7 +12,7 @@ import pytest
 from app.drivers.canopen import CanOpenDriver
 from app.drivers.contract import Driver, LinkState, MasterSign, Written
 from app.drivers.table import driver_class
-from app.errors import BusLostError, BusOpenError, ConsentError, NoAnswerError, RefusedError, SdoAbortError
+from app.errors import BusLostError, BusOpenError, ConsentError, NoAnswerError, RefusedError, SdoAbortError, UsageError
 from app.model.address import Address
 from app.model.description import Bus, Verify
 from app.twins.line import Fault, delay
@@ -77,6 +77,17 @@ def line() -> Iterator[Wire]:
 def test_the_table_knows_the_driver() -> None:
     found: type[Driver] = driver_class(Bus.CANOPEN)
     assert found is CanOpenDriver
+
+
+def test_a_bus_without_a_driver_is_a_usage_error() -> None:
+    with pytest.raises(UsageError):
+        driver_class(Bus.PROFIBUS_DP)
+
+
+async def test_it_is_ready_once_connect_returns(line: Wire) -> None:
+    for _ in range(20):
+        async with driver_on(line, listen_s=0.0) as driver:
+            assert driver.status.state is LinkState.CONNECTED
 
 
 async def test_nothing_is_sent_while_listening(line: Wire) -> None:
