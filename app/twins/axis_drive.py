@@ -6,7 +6,7 @@ every step is 1 ms, the controller's own cycle (manual, 60C2h).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from math import pi
 from typing import Final
@@ -26,10 +26,16 @@ _SETTLED_RAD_S: Final = 0.05
 """Below this nothing is left to be controlled."""
 _CURRENT_LIMIT_SHARE: Final = 0.8
 """Share of the current limit that a stop plans with, so that the controller can follow."""
+_LEAST_STOP_SHARE: Final = 0.1
+"""A stop is planned with at least this share of the rated torque, however low 6073h is."""
 _NO_WINDOW: Final = 0xFFFFFFFF
 """6065h: monitoring off."""
 _SIMULATION: Final = 1 << 15
 """60FBh/3: the axis is not moved."""
+_FEATHER_TO_SWITCH: Final = 1 << 8
+"""60FBh/3: the 90 degree switch must be actuated in feather."""
+_FEATHER_BY_VELOCITY: Final = 1 << 9
+"""60FBh/3: an EFC drives to the 90 degree switch under velocity control."""
 
 
 class Mode(Enum):
@@ -49,7 +55,7 @@ _POSITION_MODES: Final = (Mode.PROFILE_POSITION, Mode.CYCLIC_POSITION, Mode.HOMI
 
 @dataclass(frozen=True, slots=True)
 class _Parameters:
-    """Parameters that every cycle needs, read once for each batch of cycles."""
+    """Parameters that every cycle needs, read when one of them was written."""
 
     scaling: Scaling
     position_gain: float
@@ -86,6 +92,7 @@ class AxisDrive:
         self._peak_spent = False
         self._following_s = 0.0
         self._window_s = 0.0
+        self._feather_target: Target | None = None
         self.blade = blade_scaling(store)
         self._now = self._read_parameters()
 
@@ -195,7 +202,7 @@ class AxisDrive:
     # -- commanded through objects -------------------------------------------------------
 
     def refresh(self) -> None:
-        """Take the parameters in force; called before a batch of cycles and when one was written."""
+        """Take the parameters in force, after one was written."""
         before = self._now.scaling
         self._now = self._read_parameters()
         if self._now.scaling != before:
@@ -395,8 +402,24 @@ class AxisDrive:
         if not velocity or not acceleration:
             acceleration = self._current_limit_deceleration()
             velocity = velocity or self._now.speed_limit_rad_s * abs(self.scaling.units_per_rad)
-        self.targets.force(Target(self._limited_position(store.number(0x607A)), velocity, acceleration, deceleration))
+        self._feather_target = Target(
+            self._limited_position(store.number(0x607A)), velocity, acceleration, deceleration
+        )
+        self.targets.force(self._feather_target)
         self._window_s = 0.0
+        if store.number(0x60FB, 3) & _FEATHER_BY_VELOCITY:
+            self._seek_switch()
+
+    def feather_on(self) -> None:
+        """The EFC target is reached without the 90 degree switch: go on to it, where 60FBh/3 bit 8 demands it."""
+        if self.targets.reached and self._store.number(0x60FB, 3) & _FEATHER_TO_SWITCH:
+            self._seek_switch()
+
+    def _seek_switch(self) -> None:
+        """Drive on with the velocity of the EFC; the switch ends it (T5), at the latest the upper position limit."""
+        target = self._feather_target
+        if target is not None:
+            self.targets.force(replace(target, position=float(self._store.number(0x607D, 2))))
 
     def _motion_limits(self) -> tuple[float, float, float]:
         """Velocity, acceleration and deceleration in force, each within its maximum (607Fh, 60C5h, 60C6h).
@@ -419,7 +442,8 @@ class AxisDrive:
 
     def _current_limit_deceleration(self) -> float:
         constants = self.plant.constants
-        rate = self._now.peak_torque_nm * _CURRENT_LIMIT_SHARE / constants.inertia_kgm2
+        torque_nm = max(self._now.peak_torque_nm, constants.rated_torque_nm * _LEAST_STOP_SHARE)
+        rate = torque_nm * _CURRENT_LIMIT_SHARE / constants.inertia_kgm2
         return rate * abs(self.scaling.units_per_rad)
 
     def _velocity_target(self) -> float:

@@ -14,30 +14,26 @@ _NEGATIVE = 0x80
 
 @dataclass(frozen=True, slots=True)
 class Scaling:
-    """``units_per_increment`` exact; ``sign`` is -1 for negative polarity; ``offset`` the home offset in units."""
+    """``units_per_increment`` is exact, the numbers that every cycle needs are floats.
+
+    ``sign`` is -1 for negative polarity; ``offset`` is the home offset in units; ``units_per_rad`` has the sign of the
+    polarity.
+    """
 
     units_per_increment: Fraction
-    increments_per_turn: Fraction
+    units_per_turn: Fraction
     sign: int
     offset: int
+    units_per_rad: float
+    signed_factor: float
 
     def position(self, increments: float) -> float:
         """Actual position: the encoder's position in units plus the home offset."""
-        return self.sign * increments * float(self.units_per_increment) + self.offset
+        return increments * self.signed_factor + self.offset
 
     def offset_for(self, increments: float, position: int) -> int:
         """The home offset with which the encoder's count becomes ``position``."""
-        return position - round(self.sign * increments * float(self.units_per_increment))
-
-    @property
-    def units_per_turn(self) -> float:
-        """Position units per revolution of the encoder's shaft, with the sign of the polarity."""
-        return self.sign * float(self.increments_per_turn * self.units_per_increment)
-
-    @property
-    def units_per_rad(self) -> float:
-        """Position units per radian of the encoder's shaft."""
-        return self.units_per_turn / (2 * pi)
+        return position - round(increments * self.signed_factor)
 
 
 def units_per_increment(resolution: Fraction, gear: Fraction, feed: Fraction) -> Fraction:
@@ -59,7 +55,8 @@ def _scaling(store: ObjectStore, home: int, polarity: int, resolution: int, gear
     per_turn = _ratio(store, resolution)
     factor = units_per_increment(per_turn, _ratio(store, gear), _ratio(store, feed))
     sign = -1 if store.number(polarity) & _NEGATIVE else 1
-    return Scaling(factor, per_turn, sign, store.number(home))
+    turn = per_turn * factor
+    return Scaling(factor, turn, sign, store.number(home), sign * float(turn) / (2 * pi), sign * float(factor))
 
 
 def _ratio(store: ObjectStore, index: int) -> Fraction:

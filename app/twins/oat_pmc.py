@@ -31,7 +31,7 @@ _BEYOND_SWITCHES: Final = 1 << 14
 _OVERSPEED_SHARE: Final = 1.2
 """8400h; its threshold is not printed, 20 % above 6080h is taken."""
 _SCALING_OBJECTS: Final = frozenset(
-    (0x607C, 0x607E, 0x608F, 0x6091, 0x6092, 0x606A, 0x6065, 0x6066, 0x6067, 0x6068, 0x60FB, 0x6073, 0x6080)
+    (0x607C, 0x607E, 0x608F, 0x6091, 0x6092, 0x606A, 0x6065, 0x6066, 0x6067, 0x6068, 0x60F6, 0x60FB, 0x6073, 0x6080)
 )
 _BLADE_SCALING_OBJECTS: Final = frozenset((0x687C, 0x687E, 0x688F, 0x6891, 0x6892))
 
@@ -72,6 +72,7 @@ class OatPmc(Application):
         self._hit_0 = self._hit_90 = self._reset_edge = False
         self._homed = self._homing_error = False
         self._hot_since_ns: dict[int, int] = {}
+        self._differs_since_ns = 0
         self._bind_values()
         self._bind_commands()
 
@@ -94,7 +95,7 @@ class OatPmc(Application):
         self.drive.refresh_blade()
         self.machine.reset()
         self._was_0, self._was_90, self._was_95 = self.plant.at_0, self.plant.at_90, self.plant.at_95
-        self._last_ns = t_ns
+        self._last_ns = self._differs_since_ns = t_ns
 
     def booted(self, t_ns: int) -> None:
         """T1."""
@@ -123,7 +124,6 @@ class OatPmc(Application):
     def tick(self, t_ns: int) -> None:
         """Move axis and monitors on to ``t_ns``."""
         if self.drive.busy:
-            self.drive.refresh()
             for cycle_ns in range(self._last_ns + _CYCLE_NS, t_ns + 1, _CYCLE_NS):
                 self.drive.cycle()
                 self._last_ns = cycle_ns
@@ -135,6 +135,8 @@ class OatPmc(Application):
             self.plant.rest()
         self._look_at_switches()
         self._monitor(t_ns)
+        if self.machine.feathering:
+            self.drive.feather_on()
         self._evaluate(t_ns)
         self.device.poll(t_ns)
 
@@ -298,10 +300,22 @@ class OatPmc(Application):
         store, power, errors = self._store, self._power, self.errors
         errors.condition(0x3220, power.dc_link_v < store.number(0x6510, 4))
         errors.condition(0x3210, power.dc_link_v > store.number(0x6510, 5))
+        self._watch_difference(t_ns)
         highest = store.number(0x6080) * _OVERSPEED_SHARE
         errors.condition(0x8400, abs(self._motor_rpm()) > highest)
         self._watch_temperature(0x4210, power.heat_sink_c, store.number(0x6510, 6), store.number(0x6510, 2), t_ns)
         self._watch_temperature(0x4310, power.motor_c, store.number(0x6410, 8), store.number(0x6410, 7), t_ns)
+
+    def _watch_difference(self, t_ns: int) -> None:
+        """8620h: the encoders differ by more than 6865h for longer than 6866h ms.
+
+        OPEN what a window of 0 (its default) means; no monitoring, for literally every twin would fail at once.
+        """
+        window = self._store.number(0x6865)
+        difference = abs(self.drive.motor_position - self.drive.blade_position)
+        if not window or difference <= window:
+            self._differs_since_ns = t_ns
+        self.errors.condition(0x8620, t_ns - self._differs_since_ns > self._store.number(0x6866) * MS)
 
     def _watch_temperature(self, code: int, temperature_c: float, warning: int, highest: int, t_ns: int) -> None:
         """Warning at its level; error 30 s after the maximum. OPEN from where the 30 s count.

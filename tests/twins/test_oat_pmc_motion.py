@@ -321,7 +321,7 @@ def test_scaling_of_the_worked_example(rig: BladeRig) -> None:
     scaling = motor_scaling(rig.pmc.device.store)
     assert scaling.units_per_increment == Fraction(375, 18056)
     assert 1 / float(scaling.units_per_increment) == pytest.approx(48.14933, abs=5e-6)
-    assert abs(scaling.units_per_turn) == pytest.approx(21.26717, abs=5e-6)
+    assert float(scaling.units_per_turn) == pytest.approx(21.26717, abs=5e-6)
     assert 36000 / scaling.units_per_increment == 1733376
     before = rig.blade.axis.encoder_increments
     rig.enable()

@@ -431,6 +431,31 @@ def test_efc_interrupts_a_move_and_its_halt(rig: BladeRig) -> None:
     rig.run_until(lambda: rig.blade.axis.at_90, 20_000 * MS)
 
 
+@pytest.mark.rule("L5")
+@pytest.mark.parametrize(("flag", "angle_deg"), [(0, 88.0), (1 << 8, 90.0), (1 << 9, 90.0)])
+def test_efc_goes_on_to_the_switch_where_the_flags_say_so(rig: BladeRig, flag: int, angle_deg: float) -> None:
+    rig.put("567A", 8800)
+    rig.put("60FB:03", flag | 1)
+    rig.pmc.inputs.efc = False
+    rig.master.run(6000 * MS)
+    assert rig.angle_deg == pytest.approx(angle_deg, abs=2.2 if flag else 0.02)
+    assert rig.blade.axis.at_90 is bool(flag)
+
+
+@pytest.mark.rule("M3")
+def test_difference_of_the_encoders(rig: BladeRig) -> None:
+    rig.put("6060", 6)
+    rig.put("687C", rig.get("687C") + 50)
+    rig.put("6866", 500)
+    rig.master.run(1000 * MS)
+    assert rig.errors() == []
+    rig.put("6865", 40)
+    rig.master.run(400 * MS)
+    assert rig.errors() == []
+    rig.master.run(300 * MS)
+    assert rig.errors() == [0x8620]
+
+
 def test_restart_takes_the_stage_off_and_leaves_the_blade(rig: BladeRig) -> None:
     rig.enable()
     rig.move(7000)
