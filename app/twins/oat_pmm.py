@@ -45,6 +45,7 @@ _ALARM_FAULT: Final = 1 << 14
 _ALARM_HIGH: Final = 1 << 15
 _SAFETY_CHAIN: Final = 1 << 16
 _LED_STATUS, _LED_FAULT, _LED_WATCHDOG, _LED_BUS = 1 << 24, 1 << 25, 1 << 26, 1 << 27
+_MANUAL_BY_OBJECT: Final = 1 << 5
 _BATTERY_CODES: Final = frozenset(range(0x3280, 0x3290))
 _REMANENT: Final = (0x3050, 0x3051, 0x3052)
 
@@ -67,6 +68,10 @@ class PmmInputs:
 
     digital: int = 1 << 0 | 1 << 2 | 1 << 3 | 1 << 4 | 1 << 9 | 1 << 12 | 1 << 20
     analog_mv: float = 4900.0
+    selector: int = 0
+    """Selector switch for manual functions, 0..15."""
+    key: bool = False
+    """Key button of the manual functions."""
     sensors: list[SensorState] = field(default_factory=lambda: [SensorState.FITTED, SensorState.FITTED])
 
 
@@ -256,6 +261,16 @@ class OatPmm(Application):
         outputs |= _LED_STATUS if self._booted else 0
         return outputs | (_LED_BUS if self.device.state is NmtState.OPERATIONAL else 0)
 
+    def _digital_inputs(self) -> int:
+        """30FDh (table 34): clamps, push-button in bit 27, selector switch from bit 28 on."""
+        return self.inputs.digital | self.inputs.key << 27 | (self.inputs.selector & 0x0F) << 28
+
+    def _manual_out(self) -> int:
+        """5042h: from 5040h where its bit 5 is set, else from selector switch and key button (3.3.1)."""
+        if self._manual & _MANUAL_BY_OBJECT:
+            return self._manual & 0x1F
+        return (self.inputs.selector & 0x0F) | self.inputs.key << 4
+
     # -- status objects ---------------------------------------------------------------------------
 
     def _pmm_status(self) -> int:
@@ -338,8 +353,9 @@ class OatPmm(Application):
             0x30B2: lambda: self._remaining_ms(store.number(0x30E0)),
             0x30B3: lambda: -(-self._remaining_ms(store.number(0x30E1) * 1000) // 1000),
             0x30B4: lambda: round(power.battery_ohm * 1000),
-            0x30FD: lambda: self.inputs.digital,
-            0x5042: lambda: self._manual,
+            0x30FD: self._digital_inputs,
+            0x5041: lambda: self._manual_out() & 0x0F,
+            0x5042: self._manual_out,
             0x603F: lambda: self.errors.code,
         }
         for index, source in sources.items():

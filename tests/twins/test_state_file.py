@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -89,6 +91,36 @@ def test_a_disk_that_cannot_be_written_is_a_refused_save(tmp_path: Path) -> None
     rig.pmc.device.memory._file = StateFile(folder / "x.json", "oat-pmc")
     assert rig.refused("1010:03", 0x65766173) == 0x06060000
     assert rig.pmc.device.memory.problem
+
+
+_WRITER = """
+import sys
+from pathlib import Path
+from app.model.address import Address
+from app.twins.state_file import Memory, StateFile
+file = StateFile(Path(sys.argv[1]), "oat-pmc")
+for number in range(1, 10**9):
+    data = number.to_bytes(4, "little")
+    file.store(Memory({Address(0x6065, sub): data for sub in range(200)}, {}))
+    print(number, flush=True)
+"""
+
+
+def test_a_kill_at_any_moment_leaves_one_whole_state(tmp_path: Path) -> None:
+    path = tmp_path / "state.json"
+    for saves in (1, 3, 8, 20):
+        writer = subprocess.Popen(
+            [sys.executable, "-c", _WRITER, str(path)], stdout=subprocess.PIPE, cwd=Path(__file__).parents[2]
+        )
+        with writer:
+            assert writer.stdout is not None
+            for _ in range(saves):
+                done = int(writer.stdout.readline())
+            writer.kill()
+        memory = StateFile(path, "oat-pmc").load().memory
+        assert memory is not None
+        (data,) = set(memory.saved.values())
+        assert int.from_bytes(data, "little") >= done
 
 
 def test_what_is_saved(tmp_path: Path) -> None:
