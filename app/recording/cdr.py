@@ -70,7 +70,9 @@ def valid(frame: Frame) -> bool:
     can = frame.payload
     if not 0 <= frame.t_ns < MAX_T_NS:
         return False
-    return not isinstance(can, Can) or (0 <= can.can_id <= MAX_ID and len(can.data) <= MAX_DATA and can.dlc <= MAX_DLC)
+    return not isinstance(can, Can) or (
+        0 <= can.can_id <= MAX_ID and len(can.data) <= MAX_DATA and -1 <= can.dlc <= MAX_DLC
+    )
 
 
 def encode_can(channel_id: int, bus: str, frames: Sequence[Frame]) -> CanArray:
@@ -83,9 +85,11 @@ def encode_can(channel_id: int, bus: str, frames: Sequence[Frame]) -> CanArray:
     times = np.array(t_ns, dtype=np.uint64)
     lengths = np.fromiter(map(len, datas), np.int64, len(datas))
     dlc = np.array(dlcs, dtype=np.int64)
-    dlc = np.where(dlc < 0, lengths, dlc)
-    if lengths.max() > MAX_DATA or dlc.max() > MAX_DLC or max(can_ids) > MAX_ID or times.max() >= MAX_T_NS:
-        raise ValueError("a frame that does not fit into its message type")
+    dlc = np.where(dlc == -1, lengths, dlc)
+    if lengths.max() > MAX_DATA or not 0 <= dlc.min() <= dlc.max() <= MAX_DLC:
+        raise ValueError("a length that no classic CAN frame has")
+    if max(can_ids) > MAX_ID or times.max() >= MAX_T_NS:
+        raise ValueError("an identifier or a time stamp out of range")
     records: CanArray = np.zeros(len(times), dtype=can_dtype(bus))
     records["opcode"] = OP_MESSAGE
     records["length"] = records.dtype.itemsize - RECORD_PREFIX.size

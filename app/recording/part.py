@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -85,6 +86,8 @@ class Part:
             self._write_head(identity, info, attachments)
         except OSError:
             self._file.close()
+            with suppress(OSError):  # nothing is in it yet; where it cannot be removed, it is recovered as empty
+                path.unlink()
             raise
 
     def _write_head(self, identity: Identity, info: RecordingInfo, attachments: Iterable[AttachedFile]) -> None:

@@ -259,11 +259,25 @@ class RecorderCore:
         self._append(self._part, batch, attachments)
         self._close_part()
 
+    def give_up(self, detail: str) -> None:
+        """After a defect: closes the file as it is; from now on every frame is lost."""
+        with self._lock:
+            part, self._part = self._part, None
+            self._state, self._reason, self._detail = RecorderState.FAILED, BlockReason.DEFECT, detail
+            self._lose(self._pending.frames, LossReason.BLOCKED)
+            self._pending = Batch()
+            if part is not None:
+                self._closed_frames += part.frames
+                self._closed_bytes += part.size_bytes
+                part.abandon()
+
     def _take_pending(self) -> tuple[Batch, list[AttachedFile]]:
         with self._lock:
             batch, self._pending = self._pending, Batch()
             attachments, self._new_attachments = self._new_attachments, []
-            losses, self._losses = self._losses, {}
+            losses: dict[tuple[str, LossReason], _Loss] = {}
+            if self._part is not None:  # else they add up until there is a file to say so
+                losses, self._losses = self._losses, losses
         for (bus, reason), loss in losses.items():
             details = {"count": loss.frames, "from_ns": loss.from_ns, "to_ns": loss.to_ns, "reason": reason.value}
             batch.events.append(event_entry(Event(self._clock.stamp(), EventKind.FRAMES_LOST, bus, details)))
@@ -303,10 +317,9 @@ class RecorderCore:
     def _open_part(self) -> None:
         """The next file, or the state ``BLOCKED`` where the disk gives none. Takes back ``BLOCKED`` where it does."""
         self._retry_due_ns = self._clock.monotonic_ns() + int(self._settings.retry_s * NS)
-        path = self._directory / f"{self._recording}-{self._number + 1:03d}.mcap"
-        created_ns = self._clock.stamp()
-        identity = Identity(self._recording, self._number + 1, self._since_ns, created_ns)
         try:
+            number, path = self._next_file()
+            identity = Identity(self._recording, number, self._since_ns, self._clock.stamp())
             self._directory.mkdir(parents=True, exist_ok=True)
             self._free = self._free_bytes(self._directory)
             if self._free < self._needed_bytes():
@@ -317,6 +330,13 @@ class RecorderCore:
             self._block(BlockReason.DISK_ERROR, str(error))
             return
         self._resumed(part, path)
+
+    def _next_file(self) -> tuple[int, Path]:
+        """Number and path of the next file; one that a refusing disk left half made is passed over."""
+        number = self._number + 1
+        while (path := self._directory / f"{self._recording}-{number:03d}.mcap").exists():
+            number += 1
+        return number, path
 
     def _needed_bytes(self) -> int:
         """Free bytes to open a file: more after a stop, or a new file would come every few seconds."""
@@ -417,8 +437,7 @@ class Recorder(RecorderCore):
             self.shut()
         except Exception as error:
             _logger.exception("the recorder has ended by a defect of its own")
-            with self._lock:
-                self._state, self._reason, self._detail = RecorderState.FAILED, BlockReason.DEFECT, repr(error)
+            self.give_up(repr(error))
 
 
 def _read_together(clock: RecorderClock) -> tuple[int, int]:
