@@ -26,7 +26,10 @@ const fileOf = (language: string): string =>
   fileURLToPath(new URL(`../../app/locales/${language}.toml`, import.meta.url));
 
 function bootTable(language: string): Record<string, string> {
-  const page = parse(readFileSync(fileOf(language), "utf-8")).page as { boot?: Record<string, string> } | undefined;
+  const page = parse(readFileSync(fileOf(language), "utf-8")).page as
+    { boot?: Record<string, string> } | undefined;
   // That no key is missing is for the tests to say (texts/catalogue.test.ts): here a missing text shows its key.
-  return Object.fromEntries(Object.entries(page?.boot ?? {}).map(([key, text]) => [`page.boot.${key}`, text]));
+  return Object.fromEntries(
+    Object.entries(page?.boot ?? {}).map(([key, text]) => [`page.boot.${key}`, text]),
+  );
 }

@@ -59,7 +59,8 @@ const device = (slug: string) => `/api/live/devices/${slug}`;
 
 export const commands = {
   read: (slug: string, addresses: string[] | null) => post<Job>(`${device(slug)}/read`, { addresses }),
-  write: (slug: string, address: string, raw: Raw) => post<WriteResult>(`${device(slug)}/write`, { address, raw }),
+  write: (slug: string, address: string, raw: Raw) =>
+    post<WriteResult>(`${device(slug)}/write`, { address, raw }),
   save: (slug: string) => post<SaveResult>(`${device(slug)}/save`, {}),
   restart: (slug: string) => post<RestartResult>(`${device(slug)}/restart`, {}),
   stop: () => post<StopResult>("/api/live/stop", {}),

@@ -60,6 +60,7 @@ export interface EntryDoc extends QuantityDoc {
   access: Access;
   readable: boolean;
   writable: boolean;
+  pdo: boolean;
   default: RawDoc | null;
   node_id: boolean;
   saved: boolean;
@@ -132,6 +133,8 @@ export interface Job {
   done: number;
   total: number;
   failed: JobFailure[];
+  /** Why it failed as a whole. */
+  error: JobFailure | null;
 }
 
 export interface WriteResult {
@@ -154,7 +157,12 @@ export interface RestartResult {
 }
 
 export interface StopResult {
-  axes: { device: string; sent_t_ns: number; confirmed_t_ns: number | null; how: "rpdo" | "sdo" | "failed" }[];
+  axes: {
+    device: string;
+    sent_t_ns: number;
+    confirmed_t_ns: number | null;
+    how: "rpdo" | "sdo" | "failed";
+  }[];
 }
 
 /* The socket */
@@ -178,7 +186,8 @@ export interface LinkData {
   load: number;
   frames: number;
   recording: RecordingStatus;
-  other_masters: unknown[];
+  dropped: number;
+  other_masters: { bus: string; sign: string; can_id: number; t_ns: number; count: number }[];
 }
 
 export type NmtName = "operational" | "pre-operational" | "stopped" | "booting" | "unknown";
@@ -187,6 +196,8 @@ export interface NodeData {
   device: string;
   node: number;
   nmt: NmtName;
+  /** Its heartbeat is overdue. */
+  silent: boolean;
   heartbeat_t_ns: number | null;
   heartbeat_period_ms: number | null;
   boots: number;
@@ -211,14 +222,18 @@ export interface AxisData {
 export interface ValueData {
   raw: Raw | null;
   hex: string | null;
-  t_ns: number;
-  source: string;
+  t_ns: number | null;
+  source: "sdo-read" | "sdo-write" | "pdo" | "emcy" | null;
   stored: { raw: Raw; state: "proven" | "saved" } | null;
   known: boolean;
+  /** Frames were lost since it was seen, or its mirror was written. */
+  stale: boolean;
 }
 
 export interface ValuesData {
   device: string;
+  /** These are all that is known: drop what was known before. */
+  full: boolean;
   values: Record<string, ValueData>;
 }
 

@@ -11,7 +11,8 @@ import type { EventData } from "../api/types";
 import { useEvents } from "../live/live";
 import type { NumberedEvent } from "../live/store";
 import { type Translate, useTexts } from "../texts/texts";
-import { lastOf, timeOfDay } from "../ui/format";
+import { useDeviceName } from "../ui/devices";
+import { timeOfDay } from "../ui/format";
 import classes from "./Frame.module.css";
 import { usePageSearch } from "./search";
 
@@ -19,12 +20,12 @@ const SEVERITY_ICONS = { info: IconInfoCircle, warning: IconAlertTriangle, error
 const SEVERITY_TONES = { info: "dim", warning: "tone-warning", error: "tone-error" };
 
 const textOf = (event: EventData, t: Translate) => t(event.text_key, event.details);
-const deviceOf = (event: EventData) => (event.device === null ? "–" : lastOf(event.device));
 
 /** What happened, newest first; closed it still shows the newest. */
 export function EventDrawer() {
   const t = useTexts();
   const events = useEvents();
+  const nameOf = useDeviceName();
   const [search, update] = usePageSearch();
   const open = search.events === "open";
   const latest = events[0];
@@ -43,7 +44,7 @@ export function EventDrawer() {
           <span className={`${classes.eventLatest} bench`}>
             <span className="dim">{timeOfDay(latest.t_ns / 1e6)}</span>
             <Severity severity={latest.severity} />
-            <span className="dim">{deviceOf(latest)}</span>
+            <span className="dim">{latest.device === null ? "–" : nameOf(latest.device)}</span>
             <span className={classes.ellipsis}>{textOf(latest, t)}</span>
           </span>
         )}
@@ -66,10 +67,15 @@ function Severity({ severity }: { severity: EventData["severity"] }) {
 
 function EventTable({ events }: { events: readonly NumberedEvent[] }) {
   const t = useTexts();
+  const nameOf = useDeviceName();
   const [filter, setFilter] = useState("");
   const wanted = filter.trim().toLowerCase();
   const shown = events
-    .map((event) => ({ event, text: textOf(event, t), device: deviceOf(event) }))
+    .map((event) => ({
+      event,
+      text: textOf(event, t),
+      device: event.device === null ? "–" : nameOf(event.device),
+    }))
     .filter((line) => `${line.text} ${line.device}`.toLowerCase().includes(wanted));
   return (
     <div className={`${classes.eventBody} bench`}>

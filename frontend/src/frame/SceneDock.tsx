@@ -33,7 +33,11 @@ export function SceneDock() {
             data-testid="scene-toggle"
             onClick={() => update({ scene: open ? "off" : undefined })}
           >
-            {open ? <IconLayoutSidebarRightCollapse aria-hidden /> : <IconLayoutSidebarRightExpand aria-hidden />}
+            {open ? (
+              <IconLayoutSidebarRightCollapse aria-hidden />
+            ) : (
+              <IconLayoutSidebarRightExpand aria-hidden />
+            )}
           </ActionIcon>
         </Tooltip>
       </div>
@@ -48,7 +52,8 @@ function SceneView() {
   const ready = useIdle();
   const frame = useRef<HTMLIFrameElement>(null);
   // The frame is of our own origin: Esc must stop there as well.
-  const listen = () => frame.current?.contentWindow?.addEventListener("keydown", stopOnEscape, { capture: true });
+  const listen = () =>
+    frame.current?.contentWindow?.addEventListener("keydown", stopOnEscape, { capture: true });
   return (
     <div className={`${classes.sceneBody} bench`}>
       <div className={classes.sceneWait}>{t("page.scene.loading")}</div>

@@ -26,9 +26,16 @@ export function Shell() {
 }
 
 function Gate({ wanted }: { wanted: Language | undefined }) {
-  const session = useQuery({ ...sessionQuery, refetchInterval: (query) => (query.state.data ? false : RETRY_MS) });
+  const session = useQuery({
+    ...sessionQuery,
+    refetchInterval: (query) => (query.state.data ? false : RETRY_MS),
+  });
   const language = wanted ?? session.data?.locale ?? browserLanguage();
-  const texts = useQuery({ ...textsQuery(language), enabled: session.isSuccess, placeholderData: (before) => before });
+  const texts = useQuery({
+    ...textsQuery(language),
+    enabled: session.isSuccess,
+    placeholderData: (before) => before,
+  });
   const t = useMemo(() => translator(texts.data ?? {}, language), [texts.data, language]);
   useEffect(() => {
     document.documentElement.lang = language;
@@ -45,7 +52,8 @@ function Gate({ wanted }: { wanted: Language | undefined }) {
     );
   }
   const boot = bootTranslator(language);
-  if (session.error instanceof Problem && session.error.doc.status === UNAUTHORISED) return <NoAccess t={boot} />;
+  if (session.error instanceof Problem && session.error.doc.status === UNAUTHORISED)
+    return <NoAccess t={boot} />;
   if (session.error ?? texts.error) return <NoAccess t={boot} unreachable />;
   return (
     <Center h="100%">

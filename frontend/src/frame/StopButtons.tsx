@@ -3,7 +3,8 @@ import { IconHandStop, IconWind } from "@tabler/icons-react";
 import { useAxes, useHearing, useLink } from "../live/live";
 import { useTexts } from "../texts/texts";
 import classes from "./Frame.module.css";
-import { Halt, mayMove, useHalt, useLendStop } from "./stop";
+import { mayMove } from "./motion";
+import { Halt, useHalt, useLendStop } from "./stop";
 
 /** Always at the same place. Grey only where nothing is connected; a deaf page still tries. */
 export function StopButtons() {

@@ -12,10 +12,10 @@ import {
 import { useQuery } from "@tanstack/react-query";
 import { useComputedColorScheme } from "@mantine/core";
 import { turbineQuery } from "../api/queries";
-import type { LinkData, Mode } from "../api/types";
+import type { LinkData, Mode, RecordingStatus } from "../api/types";
 import { useHearing, useLink, useLoadHistory, useServerNow } from "../live/live";
 import { figure } from "../model/values";
-import { useTexts } from "../texts/texts";
+import { type Translate, useTexts } from "../texts/texts";
 import { Sparkline } from "../ui/Sparkline";
 import { clock, megabytes } from "../ui/format";
 import classes from "./Frame.module.css";
@@ -73,7 +73,12 @@ function BusFacts({ link }: { link: LinkData | null }) {
         </span>
       </div>
       {connected && (
-        <Sparkline values={history} max={1} className={classes.sparkline ?? ""} label={t("page.bus.sparkline")} />
+        <Sparkline
+          values={history}
+          max={1}
+          className={classes.sparkline ?? ""}
+          label={t("page.bus.sparkline")}
+        />
       )}
     </div>
   );
@@ -88,19 +93,32 @@ function RecordingLight({ link }: { link: LinkData | null }) {
   const ranMs = recording.since_ns === null ? 0 : nowMs - recording.since_ns / 1e6;
   const losing = recording.lost > 0;
   return (
-    <Tooltip label={recording.file ?? recording.reason ?? t(`page.recording.${recording.state}`)}>
+    <Tooltip label={recordingTitle(recording, t)}>
       <div className={`${classes.record} bench`} data-testid="recording" tabIndex={0}>
         <span className={classes.light} data-on={on} aria-hidden />
         <div className={classes.facts}>
-          <strong>{on ? t("page.recording.running", { clock: clock(ranMs) }) : t(`page.recording.${recording.state}`)}</strong>
+          <strong>
+            {on
+              ? t("page.recording.running", { clock: clock(ranMs) })
+              : t(`page.recording.${recording.state}`)}
+          </strong>
           <span className={losing ? "tone-error" : "dim"}>
             {losing && <IconAlertTriangle size={13} aria-hidden />}{" "}
-            {t("page.recording.facts", { size: megabytes(recording.size_bytes, t.language), lost: recording.lost })}
+            {t("page.recording.facts", {
+              size: megabytes(recording.size_bytes, t.language),
+              lost: recording.lost,
+            })}
           </span>
         </div>
       </div>
     </Tooltip>
   );
+}
+
+/** The file, and why the recording stands still or is not whole. */
+function recordingTitle(recording: RecordingStatus, t: Translate): string {
+  const reason = recording.reason === null ? null : t(recording.reason);
+  return [recording.file, reason].filter(Boolean).join("\n") || t(`page.recording.${recording.state}`);
 }
 
 function Tools() {
@@ -123,7 +141,11 @@ function Tools() {
         </ActionIcon>
       </Tooltip>
       <Tooltip label={t(`page.tools.${other}`)}>
-        <ActionIcon aria-label={t(`page.tools.${other}`)} data-testid="theme" onClick={() => update({ theme: other })}>
+        <ActionIcon
+          aria-label={t(`page.tools.${other}`)}
+          data-testid="theme"
+          onClick={() => update({ theme: other })}
+        >
           {scheme === "dark" ? <IconSun size={18} aria-hidden /> : <IconMoon size={18} aria-hidden />}
         </ActionIcon>
       </Tooltip>

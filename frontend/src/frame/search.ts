@@ -48,7 +48,9 @@ export function parseSearch(text: string): Record<string, string> {
 }
 
 export function stringifySearch(search: Record<string, unknown>): string {
-  const pairs = Object.entries(search).filter((pair): pair is [string, string] => typeof pair[1] === "string");
+  const pairs = Object.entries(search).filter(
+    (pair): pair is [string, string] => typeof pair[1] === "string",
+  );
   if (pairs.length === 0) return "";
   return `?${new URLSearchParams(pairs).toString().replaceAll("%2F", "/").replaceAll("%3A", ":").replaceAll("%2C", ",")}`;
 }

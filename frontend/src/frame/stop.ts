@@ -2,10 +2,11 @@
 import { useMutation } from "@tanstack/react-query";
 import { useEffect } from "react";
 import { commands } from "../api/client";
-import type { AxisData, StopResult } from "../api/types";
+import type { StopResult } from "../api/types";
 import { store } from "../live/live";
+import { mayMove } from "./motion";
 import { type Translate, useTexts } from "../texts/texts";
-import { lastOf } from "../ui/format";
+import { useDeviceName } from "../ui/devices";
 import { notify } from "../ui/notices";
 import { storyOf } from "../ui/problem";
 
@@ -14,20 +15,9 @@ export enum Halt {
   Feather = "feather",
 }
 
-const STANDS_STILL_DPS = 0.05;
-const AT_REST = ["not_ready_to_switch_on", "switch_on_disabled", "ready_to_switch_on", "switched_on", "fault"];
-
-/** True unless every axis is known to be without power and at rest: what is unknown may move. */
-export function mayMove(axes: Iterable<AxisData>): boolean {
-  for (const axis of axes) {
-    if (axis.state === null || !AT_REST.some((name) => axis.state?.split(".").at(-1) === name)) return true;
-    if (Math.abs(axis.velocity_dps ?? 0) > STANDS_STILL_DPS) return true;
-  }
-  return false;
-}
-
 export function useHalt(halt: Halt) {
   const t = useTexts();
+  const nameOf = useDeviceName();
   return useMutation({
     mutationFn: () => (halt === Halt.Stop ? commands.stop() : commands.feather()),
     onSuccess: (result) => {
@@ -36,19 +26,23 @@ export function useHalt(halt: Halt) {
       notify({
         tone: confirmed ? "ok" : failed ? "error" : "warning",
         title: t(`page.${halt}.${confirmed ? "confirmed" : "unconfirmed"}`),
-        lines: haltLines(halt, result, t),
+        lines: haltLines(halt, result, t, nameOf),
       });
     },
     onError: (error) => {
       const story = storyOf(error, t);
-      notify({ tone: "error", title: t(`page.${halt}.failed`), lines: [story.happened, t("page.stop.use_hardware")] });
+      notify({
+        tone: "error",
+        title: t(`page.${halt}.failed`),
+        lines: [story.happened, t("page.stop.use_hardware")],
+      });
     },
   });
 }
 
-function haltLines(halt: Halt, result: StopResult, t: Translate): string[] {
+function haltLines(halt: Halt, result: StopResult, t: Translate, nameOf: (slug: string) => string): string[] {
   return result.axes.map((axis) => {
-    const device = lastOf(axis.device);
+    const device = nameOf(axis.device);
     if (axis.how === "failed") return t("page.stop.axis_failed", { device });
     if (axis.confirmed_t_ns === null) return t("page.stop.axis_sent", { device });
     const ms = Math.round((axis.confirmed_t_ns - axis.sent_t_ns) / 1e6);

@@ -86,7 +86,6 @@ export class LiveSocket {
   private sendTopics(): void {
     if (this.socket?.readyState !== WebSocket.OPEN) return;
     const slugs = [...this.devices.keys()];
-    this.store.expectSnapshots(slugs);
     const topics = [...BASE_TOPICS, ...slugs.map((slug) => `values:${slug}`)];
     this.socket.send(JSON.stringify({ type: "subscribe", topics }));
   }

@@ -5,13 +5,21 @@
  * (an animation frame in the browser), however many messages came. Topics: "hearing", "link", "nodes", "axes", "events",
  * "device:<slug>" and "value:<slug>/<address>".
  */
-import type { AxisData, EventData, LinkData, NodeData, ServerMessage, ValueData } from "../api/types";
+import type {
+  AxisData,
+  EventData,
+  LinkData,
+  NodeData,
+  ServerMessage,
+  ValueData,
+  ValuesData,
+} from "../api/types";
 import { Trace } from "./trace";
 
 export const MAX_EVENTS = 500;
 const LOAD_HISTORY = 60;
 
-/** A value as shown: what the socket said, and when it last became another one. */
+/** A value as shown: what the socket said, and when (server clock) it last became another one. */
 export interface Cell extends ValueData {
   changedAtMs: number | null;
 }
@@ -39,7 +47,6 @@ export class LiveStore {
 
   private readonly devices = new Map<string, Map<string, Cell>>();
   private readonly snapshots = new Map<string, number>();
-  private readonly awaitingSnapshot = new Set<string>();
   private readonly listeners = new Map<string, Set<Listener>>();
   private readonly dirty = new Set<string>();
   private readonly schedule: (flush: () => void) => void;
@@ -87,11 +94,6 @@ export class LiveStore {
     this.mark("hearing");
   }
 
-  /** The next values of these devices are full snapshots, which replace what is known. */
-  expectSnapshots(devices: Iterable<string>): void {
-    for (const device of devices) this.awaitingSnapshot.add(device);
-  }
-
   apply(message: ServerMessage): void {
     this.serverOffsetMs = message.t_ns / 1e6 - this.nowMs();
     switch (message.type) {
@@ -108,7 +110,7 @@ export class LiveStore {
       case "axes":
         return this.applyAxes(message.data, message.t_ns);
       case "values":
-        return this.applyValues(message.data.device, message.data.values);
+        return this.applyValues(message.data);
       case "event":
         return this.applyEvent(message.data);
     }
@@ -125,14 +127,17 @@ export class LiveStore {
     this.mark("axes");
   }
 
-  private applyValues(device: string, values: Record<string, ValueData>): void {
+  private applyValues({ device, full, values }: ValuesData): void {
     const known = this.devices.get(device) ?? new Map<string, Cell>();
     this.devices.set(device, known);
-    if (this.awaitingSnapshot.delete(device)) this.dropMissing(device, known, values);
+    if (full) this.dropMissing(device, known, values);
     for (const [address, value] of Object.entries(values)) {
       const before = known.get(address);
       const changed = before?.known === true && value.known && before.hex !== value.hex;
-      known.set(address, { ...value, changedAtMs: changed ? this.nowMs() : (before?.changedAtMs ?? null) });
+      known.set(address, {
+        ...value,
+        changedAtMs: changed ? this.serverNowMs() : (before?.changedAtMs ?? null),
+      });
       this.mark(`value:${device}/${address}`);
     }
     this.snapshots.set(device, this.version(device) + 1);

@@ -14,7 +14,9 @@ export function fraction(text: string): Fraction | null {
   const decimals = match[3] ?? "";
   const exponent = Number(match[4] ?? 0) - decimals.length;
   const digits = BigInt(`${match[2] ?? "0"}${decimals}`) * (match[1] === "-" ? -1n : 1n);
-  return exponent >= 0 ? { num: digits * 10n ** BigInt(exponent), den: 1n } : { num: digits, den: 10n ** BigInt(-exponent) };
+  return exponent >= 0
+    ? { num: digits * 10n ** BigInt(exponent), den: 1n }
+    : { num: digits, den: 10n ** BigInt(-exponent) };
 }
 
 /** The fraction of a finite number as its shortest decimal text says it: 0.1 is one tenth. */

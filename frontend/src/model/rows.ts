@@ -5,6 +5,9 @@ import type { Translate } from "../texts/texts";
 export interface ParameterRow {
   entry: EntryDoc;
   title: string;
+  /** Name of the array or record it belongs to; null where it stands alone. */
+  objectName: string | null;
+  ownName: string;
   group: string;
   groupTitle: string;
   /** Lower case text that the filter searches. */
@@ -32,7 +35,18 @@ export function rowsOf(doc: DescriptionDoc, t: Translate): ParameterRow[] {
   return doc.entries.map((entry, order) => {
     const title = titleOf(entry, t);
     const groupTitle = t(`group.${entry.group}`);
-    return { entry, title, group: entry.group, groupTitle, order, haystack: haystackOf(doc, entry, title, groupTitle, t) };
+    const haystack = haystackOf(doc, entry, title, groupTitle, t);
+    const objectName = entry.kind === "var" ? null : t.nameOf(entry.object_name);
+    return {
+      entry,
+      title,
+      objectName,
+      ownName: t.nameOf(entry.name),
+      group: entry.group,
+      groupTitle,
+      order,
+      haystack,
+    };
   });
 }
 
@@ -42,8 +56,22 @@ export function titleOf(entry: EntryDoc, t: Translate): string {
   return entry.kind === "var" ? name : `${t.nameOf(entry.object_name)}: ${name}`;
 }
 
-function haystackOf(doc: DescriptionDoc, entry: EntryDoc, title: string, groupTitle: string, t: Translate): string {
-  const pieces = [entry.address, `${entry.address}h`, title, entry.title, entry.unit, groupTitle, entry.access];
+function haystackOf(
+  doc: DescriptionDoc,
+  entry: EntryDoc,
+  title: string,
+  groupTitle: string,
+  t: Translate,
+): string {
+  const pieces = [
+    entry.address,
+    `${entry.address}h`,
+    title,
+    entry.title,
+    entry.unit,
+    groupTitle,
+    entry.access,
+  ];
   const bits = entry.bits === null ? [] : (doc.bit_tables[entry.bits] ?? []);
   const names = entry.enumeration === null ? [] : (doc.enumerations[entry.enumeration]?.values ?? []);
   for (const bit of bits) pieces.push(t(bit.text_key), bit.clamp ?? "");
@@ -59,7 +87,11 @@ export function filterRows(rows: readonly ParameterRow[], filter: string): reado
 }
 
 /** Groups in the order of the description, each followed by its rows in the order given, unless it is closed. */
-export function linesOf(rows: readonly ParameterRow[], groups: readonly string[], closed: ReadonlySet<string>): Line[] {
+export function linesOf(
+  rows: readonly ParameterRow[],
+  groups: readonly string[],
+  closed: ReadonlySet<string>,
+): Line[] {
   const byGroup = new Map<string, ParameterRow[]>();
   for (const row of rows) {
     const list = byGroup.get(row.group);

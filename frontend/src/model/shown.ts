@@ -26,7 +26,7 @@ export function shownOf(entry: EntryDoc, raw: Raw, { doc, lookup, t }: DeviceCon
   const named = entry.enumeration === null ? undefined : enumName(doc, entry.enumeration, raw);
   if (named !== undefined) return { text: t(named), unit: "", names: [] };
   const table = entry.bits === null ? [] : (doc.bit_tables[entry.bits] ?? []);
-  const names = setBits(entry, raw, table).map((bit) => (bit.clamp === null ? t(bit.text_key) : bit.clamp));
+  const names = setBits(entry, raw, table).map((bit) => bit.clamp ?? t(bit.text_key));
   return { text, unit: entry.hexadecimal ? "" : quantityOf(entry, lookup).unit, names };
 }
 

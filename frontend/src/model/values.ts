@@ -49,10 +49,12 @@ export const isHex = (entry: EntryDoc): boolean => entry.hexadecimal || entry.bi
 
 /** Text of a value without its unit, in the manner of the language (decimal comma in German). */
 export function show(entry: EntryDoc, raw: Raw, lookup: Lookup, language: Language): string {
-  if (typeof raw === "string") return isOctets(entry) ? octets(raw) : raw;
+  if (isOctets(entry)) return octets(String(raw));
+  const exact = fraction(String(raw));
+  if (isText(entry) || exact === null) return String(raw);
   if (isHex(entry) && isInteger(entry)) return hexadecimal(entry, raw);
   const { scale, decimals } = quantityOf(entry, lookup);
-  const scaled = times(fractionOf(raw), scale);
+  const scaled = times(exact, scale);
   const text = isFloat(entry) ? shortest(toNumber(scaled)) : toFixed(scaled, decimals);
   return localise(text, language);
 }
@@ -66,14 +68,22 @@ export function figure(number: number, decimals: number, language: Language): st
   return localise(number.toFixed(decimals), language);
 }
 
-export function hexadecimal(entry: EntryDoc, raw: number): string {
+export function hexadecimal(entry: EntryDoc, raw: Raw): string {
   const bits = BigInt(Math.max(8, entry.bit_count ?? 8));
   const pattern = BigInt.asUintN(Number(bits), BigInt(raw));
-  return `${pattern.toString(16).toUpperCase().padStart(Number(bits / 4n), "0")}h`;
+  return `${pattern
+    .toString(16)
+    .toUpperCase()
+    .padStart(Number(bits / 4n), "0")}h`;
 }
 
 function octets(hex: string): string {
-  return (hex.replaceAll(" ", "").toUpperCase().match(/.{1,2}/g) ?? []).join(" ");
+  return (
+    hex
+      .replaceAll(" ", "")
+      .toUpperCase()
+      .match(/.{1,2}/g) ?? []
+  ).join(" ");
 }
 
 function shortest(number: number): string {
@@ -83,7 +93,7 @@ function shortest(number: number): string {
 /** Raw default, with the node's number added where the description says so; null where none is given. */
 export function defaultOf(entry: EntryDoc, node: number): Raw | null {
   if (entry.default === null) return null;
-  if (typeof entry.default === "object") return entry.default.hex;
+  if (typeof entry.default === "object") return entry.default.hex.toLowerCase();
   return entry.node_id && typeof entry.default === "number" ? entry.default + node : entry.default;
 }
 
@@ -112,7 +122,11 @@ function resolve(limit: LimitDoc | null, lookup: Lookup): number | null {
   return typeof found === "number" ? toNumber(times(fractionOf(found), fractionOf(limit.factor))) : null;
 }
 
-function tighter(own: number | null, type: number | null, pick: (a: number, b: number) => number): number | null {
+function tighter(
+  own: number | null,
+  type: number | null,
+  pick: (a: number, b: number) => number,
+): number | null {
   if (own === null || type === null) return own ?? type;
   return pick(own, type);
 }
@@ -126,7 +140,6 @@ export enum Misfit {
   BelowLimit = "below",
   AboveLimit = "above",
   NotListed = "not_listed",
-  TooLarge = "too_large",
   NotAscii = "not_ascii",
 }
 
@@ -144,14 +157,14 @@ export function parse(doc: DescriptionDoc, entry: EntryDoc, typed: string, looku
   if (text === "") return misfit(Misfit.Empty);
   if (isOctets(entry)) return parseOctets(text);
   const parsed = rawNumber(entry, text) ?? scaledNumber(entry, text, lookup);
-  return parsed.ok && typeof parsed.raw === "number" ? checkNumber(doc, entry, parsed.raw, lookup) : parsed;
+  return parsed.ok ? checkNumber(doc, entry, parsed.raw, lookup) : parsed;
 }
 
 /** Checks a raw number against limits and an exclusive enumeration. */
-export function checkNumber(doc: DescriptionDoc, entry: EntryDoc, raw: number, lookup: Lookup): Parsed {
+function checkNumber(doc: DescriptionDoc, entry: EntryDoc, raw: Raw, lookup: Lookup): Parsed {
   const { low, high } = limitsOf(entry, lookup);
-  if (low !== null && raw < low) return misfit(Misfit.BelowLimit);
-  if (high !== null && raw > high) return misfit(Misfit.AboveLimit);
+  if (low !== null && Number(raw) < low) return misfit(Misfit.BelowLimit);
+  if (high !== null && Number(raw) > high) return misfit(Misfit.AboveLimit);
   const table = entry.enumeration === null ? undefined : doc.enumerations[entry.enumeration];
   if (table?.exclusive && !table.values.some((one) => one.value === raw)) return misfit(Misfit.NotListed);
   return { ok: true, raw };
@@ -160,12 +173,15 @@ export function checkNumber(doc: DescriptionDoc, entry: EntryDoc, raw: number, l
 function parseOctets(text: string): Parsed {
   const digits = text.replaceAll(/\s/g, "");
   if (!/^(?:[0-9a-f]{2})+$/i.test(digits)) return misfit(Misfit.NoHex);
-  return { ok: true, raw: digits.toUpperCase() };
+  return { ok: true, raw: digits.toLowerCase() };
 }
 
 function rawNumber(entry: EntryDoc, text: string): Parsed | null {
   const marked = RAW.exec(text);
-  if (marked) return safe(marked[1]?.startsWith("-") ? -BigInt(marked[1].slice(1)) : BigInt((marked[1] ?? "0").replace("+", "")));
+  if (marked)
+    return safe(
+      marked[1]?.startsWith("-") ? -BigInt(marked[1].slice(1)) : BigInt((marked[1] ?? "0").replace("+", "")),
+    );
   const hex = HEX.exec(text);
   if (!hex) return null;
   const number = BigInt(`0x${hex[1] ?? hex[2] ?? "0"}`);
@@ -188,9 +204,10 @@ function scaledNumber(entry: EntryDoc, text: string, lookup: Lookup): Parsed {
   return whole === null ? misfit(Misfit.Resolution) : safe(whole);
 }
 
+/** Integers beyond 2^53 travel as decimal digits. */
 function safe(number: bigint): Parsed {
   const plain = Number(number);
-  return Number.isSafeInteger(plain) ? { ok: true, raw: plain } : misfit(Misfit.TooLarge);
+  return { ok: true, raw: Number.isSafeInteger(plain) ? plain : number.toString() };
 }
 
 function misfit(why: Misfit): Parsed {

@@ -8,7 +8,13 @@ export function ProblemAlert({ error, title }: { error: unknown; title: string }
   const t = useTexts();
   const story = storyOf(error, t);
   return (
-    <Alert color="red" variant="light" title={title} icon={<IconAlertOctagon aria-hidden />} data-testid="problem">
+    <Alert
+      color="red"
+      variant="light"
+      title={title}
+      icon={<IconAlertOctagon aria-hidden />}
+      data-testid="problem"
+    >
       <Text size="sm">{story.happened}</Text>
       {story.state !== null && <Text size="sm">{t("page.problem.state", { state: story.state })}</Text>}
       <Text size="sm" fw={600}>
@@ -17,7 +23,9 @@ export function ProblemAlert({ error, title }: { error: unknown; title: string }
       {story.details.length > 0 && (
         <details>
           <summary style={{ cursor: "pointer", paddingTop: 6 }}>{t("page.problem.details")}</summary>
-          <dl style={{ display: "grid", gridTemplateColumns: "auto 1fr", gap: "2px 12px", margin: "6px 0 0" }}>
+          <dl
+            style={{ display: "grid", gridTemplateColumns: "auto 1fr", gap: "2px 12px", margin: "6px 0 0" }}
+          >
             {story.details.map(([name, detail]) => (
               <Detail key={name} name={name} detail={detail} />
             ))}

@@ -10,7 +10,9 @@ export interface Place {
 }
 
 export function placesOf(turbine: Turbine | undefined): Place[] {
-  return (turbine?.stations ?? []).flatMap((station) => station.devices.map((device) => ({ station, device })));
+  return (turbine?.stations ?? []).flatMap((station) =>
+    station.devices.map((device) => ({ station, device })),
+  );
 }
 
 export function stationName(station: StationRef, t: Translate): string {

@@ -13,7 +13,12 @@ export interface Story {
 
 export function storyOf(error: unknown, t: Translate): Story {
   if (!(error instanceof Problem)) {
-    return { happened: t("page.error.unreachable"), state: null, next: t("page.next.unreachable"), details: [] };
+    return {
+      happened: t("page.error.unreachable"),
+      state: null,
+      next: t("page.next.unreachable"),
+      details: [],
+    };
   }
   const { code, text_key, details, device_state: state, title } = error.doc;
   const next = `page.next.${code}`;

@@ -9,7 +9,6 @@ import { localise } from "../../model/values";
 import classes from "./Overview.module.css";
 
 const REDRAW_MS = 200;
-const HEIGHT_PX = 132;
 const MARKS_S = [45, 30, 15, 0];
 /** The scale never closes in below this, so that noise of a still blade does not look like motion. */
 const LEAST_SPAN_DEG = 4;
@@ -24,9 +23,13 @@ export function AngleTrace({ blade, label }: { blade: number; label: string }) {
     const element = holder.current;
     if (!element) return;
     const columns = () => store.traces.get(blade)?.columns() ?? [[], [], []];
-    const plot = new UPlot(options(element, (text) => localise(text, language)), columns(), element);
+    const plot = new UPlot(
+      options(element, (text) => localise(text, language)),
+      columns(),
+      element,
+    );
     const timer = setInterval(() => plot.setData(columns()), REDRAW_MS);
-    const observer = new ResizeObserver(() => plot.setSize({ width: element.clientWidth, height: HEIGHT_PX }));
+    const observer = new ResizeObserver(() => plot.setSize(sizeOf(element)));
     observer.observe(element);
     return () => {
       clearInterval(timer);
@@ -47,11 +50,10 @@ function options(element: HTMLElement, show: (text: string) => string): UPlot.Op
     ticks: { show: false },
   };
   return {
-    width: element.clientWidth,
-    height: HEIGHT_PX,
+    ...sizeOf(element),
     legend: { show: false },
     cursor: { show: false },
-    padding: [6, 6, 0, 0],
+    padding: [6, 14, 0, 0],
     scales: {
       x: { time: false, range: () => windowNow() },
       y: { range: (_plot, low, high) => spanOf(low, high) },
@@ -64,7 +66,13 @@ function options(element: HTMLElement, show: (text: string) => string): UPlot.Op
         splits: (_plot, _axis, _low, now) => MARKS_S.map((ago) => now - ago),
         values: () => MARKS_S.map((ago) => `${ago === 0 ? "" : "−"}${ago} s`),
       },
-      { ...axis, size: 40, gap: 4, space: 26, values: (_plot, splits) => splits.map((at) => `${show(String(at))}°`) },
+      {
+        ...axis,
+        size: 40,
+        gap: 4,
+        space: 26,
+        values: (_plot, splits) => degrees(splits, show),
+      },
     ],
     series: [
       {},
@@ -72,6 +80,16 @@ function options(element: HTMLElement, show: (text: string) => string): UPlot.Op
       { stroke: colour("--hs-warn"), width: 1.25, dash: [5, 4], points: { show: false } },
     ],
   };
+}
+
+/** All marks with the same count of decimals. */
+function degrees(splits: number[], show: (text: string) => string): string[] {
+  const decimals = splits.every((at) => Number.isInteger(at)) ? 0 : 1;
+  return splits.map((at) => `${show(at.toFixed(decimals))}°`);
+}
+
+function sizeOf(element: HTMLElement): { width: number; height: number } {
+  return { width: element.clientWidth, height: element.clientHeight };
 }
 
 function windowNow(): [number, number] {

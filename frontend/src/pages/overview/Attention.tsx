@@ -19,16 +19,18 @@ export function Attention() {
   // A page that hears nothing may not say that all is well.
   const allWell = hearing && findings.length === 0;
   return (
-    <section className={`${classes.attention} bench`} aria-label={t("page.attention.title")} data-testid="attention">
+    <section
+      className={`${classes.attention} bench`}
+      aria-label={t("page.attention.title")}
+      data-testid="attention"
+    >
       <h2>{t("page.attention.title")}</h2>
       {allWell && (
         <p className="tone-ok">
           <IconCircleCheck size={18} aria-hidden /> {t("page.attention.none")}
         </p>
       )}
-      <ul>
-        {hearing && findings.map((finding) => <FindingLine key={finding.id} finding={finding} />)}
-      </ul>
+      <ul>{hearing && findings.map((finding) => <FindingLine key={finding.id} finding={finding} />)}</ul>
     </section>
   );
 }

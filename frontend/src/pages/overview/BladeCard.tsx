@@ -20,9 +20,14 @@ export function BladeCard({ station }: { station: StationRef }) {
   const axis = useAxes().get(blade);
   const name = stationName(station, t);
   return (
-    <article className={classes.card} aria-label={name} data-testid={`blade-${blade}`} data-stale={axis?.stale ?? true}>
+    <article
+      className={classes.card}
+      aria-label={name}
+      data-testid={`blade-${blade}`}
+      data-stale={axis?.stale ?? true}
+    >
       <h2>{name}</h2>
-      <div className="bench">
+      <div className={`${classes.body} bench`}>
         <Angle axis={axis} />
         <DriveState axis={axis} />
         <dl className={classes.facts}>
@@ -86,7 +91,9 @@ function DriveState({ axis }: { axis: AxisData | undefined }) {
       </div>
       <div className={classes.fault} data-fault={fault !== null} data-testid="fault">
         {fault === null ? (
-          <span className="dim">{t(axis?.fault_code === 0 ? "page.card.no_fault" : "page.card.fault_unknown")}</span>
+          <span className="dim">
+            {t(axis?.fault_code === 0 ? "page.card.no_fault" : "page.card.fault_unknown")}
+          </span>
         ) : (
           <>
             <IconAlertOctagon size={17} aria-hidden />

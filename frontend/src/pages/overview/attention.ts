@@ -32,9 +32,11 @@ function linkFindings(link: LinkData | null): Finding[] {
   const add = (tone: Finding["tone"], id: string, details: Details = {}) =>
     found.push({ id, tone, key: `page.attention.${id}`, details, device: null });
   if (link.state !== "connected") add("error", `link_${link.state}`, { reason: link.reason });
-  if (link.recording.state === "stopped") add("error", "recording_stopped", { reason: link.recording.reason });
+  if (link.recording.state === "stopped")
+    add("error", "recording_stopped", { text_key_reason: link.recording.reason });
   if (link.recording.state === "off") add("warning", "recording_off");
   if (link.recording.lost > 0) add("error", "recording_lost", { lost: link.recording.lost });
+  if (link.dropped > 0) add("error", "frames_dropped", { dropped: link.dropped });
   if (link.other_masters.length > 0) add("warning", "other_masters");
   return found;
 }
@@ -46,13 +48,19 @@ function axisFindings({ axes, turbine }: Seen): Finding[] {
       id: `fault_${axis.blade}`,
       tone: "error",
       key: "page.attention.fault",
-      details: { blade: axis.blade, code: errorCode(axis.fault_code ?? 0), text_key_text: axis.fault_text_key },
+      details: {
+        blade: axis.blade,
+        code: errorCode(axis.fault_code ?? 0),
+        text_key_text: axis.fault_text_key,
+      },
       device: deviceOf(turbine, axis.blade, "pmc"),
     }));
 }
 
 function deviceOf(turbine: Turbine | undefined, blade: number, name: string): string | null {
-  const place = placesOf(turbine).find((one) => one.station.blade === blade && one.device.slug.endsWith(`/${name}`));
+  const place = placesOf(turbine).find(
+    (one) => one.station.blade === blade && one.device.slug.endsWith(`/${name}`),
+  );
   return place?.device.slug ?? null;
 }
 

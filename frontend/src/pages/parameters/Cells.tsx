@@ -7,7 +7,7 @@ import type { ParameterRow } from "../../model/rows";
 import { limitText, lineOf, shownOf } from "../../model/shown";
 import { defaultOf } from "../../model/values";
 import { age, timeOfDay } from "../../ui/format";
-import { isStale, isUnsaved, rawOf } from "./cellValue";
+import { ageMsOf, isStale, isUnsaved, rawOf } from "./cellValue";
 import { Column } from "./columns";
 import { useDevice } from "./context";
 import classes from "./Parameters.module.css";
@@ -23,16 +23,12 @@ interface CellProps {
 }
 
 export const TableCell = memo(function TableCell({ column, ...props }: CellProps & { column: Column }) {
-  const { entry, title } = props.row;
+  const { entry } = props.row;
   switch (column) {
     case Column.Address:
       return <span className={classes.address}>{entry.address}</span>;
     case Column.Name:
-      return (
-        <span className={classes.clip} title={title}>
-          {title}
-        </span>
-      );
+      return <NameCell row={props.row} />;
     case Column.Ram:
       return <RamCell {...props} />;
     case Column.Stored:
@@ -47,6 +43,17 @@ export const TableCell = memo(function TableCell({ column, ...props }: CellProps
       return <span className="dim">{entry.section}</span>;
   }
 });
+
+/** Where both names do not fit, that of the object gives way: its lines differ in the other. */
+function NameCell({ row }: { row: ParameterRow }) {
+  return (
+    <span className={classes.name} title={row.title}>
+      {row.objectName !== null && <span className={classes.clip}>{row.objectName}</span>}
+      {row.objectName !== null && <span className={classes.colon}>:</span>}
+      <span className={classes.own}>{row.ownName}</span>
+    </span>
+  );
+}
 
 function RamCell({ row, nowMs, silent, onOpen }: CellProps) {
   const { t, slug } = useDevice();
@@ -69,21 +76,31 @@ function RamCell({ row, nowMs, silent, onOpen }: CellProps) {
   );
 }
 
-function RamText({ entry, cell, nowMs, silent }: Omit<CellProps, "row" | "onOpen"> & { entry: EntryDoc; cell: Cell | undefined }) {
+function RamText({
+  entry,
+  cell,
+  nowMs,
+  silent,
+}: Omit<CellProps, "row" | "onOpen"> & { entry: EntryDoc; cell: Cell | undefined }) {
   const context = useDevice();
   const { t } = context;
   const raw = rawOf(cell);
   if (!cell || raw === null) {
     const text = entry.readable ? DASH : t("page.table.write_only");
     return (
-      <span id={`ram-${entry.address}`} className="dim" title={unknownTitle(cell, entry, context)} data-known="false">
+      <span
+        id={`ram-${entry.address}`}
+        className="dim"
+        title={unknownTitle(cell, entry, context)}
+        data-known="false"
+      >
         {text}
       </span>
     );
   }
   const shown = shownOf(entry, raw, context);
-  const stale = isStale(cell, nowMs, silent);
-  const fresh = cell.changedAtMs !== null && Date.now() - cell.changedAtMs < FLASH_MS;
+  const stale = isStale(entry, cell, nowMs, silent);
+  const fresh = cell.changedAtMs !== null && nowMs - cell.changedAtMs < FLASH_MS;
   return (
     <span
       key={cell.changedAtMs}
@@ -97,7 +114,7 @@ function RamText({ entry, cell, nowMs, silent }: Omit<CellProps, "row" | "onOpen
     >
       <b>{shown.text}</b>
       <i>{shown.names.length > 0 ? shown.names.join(", ") : shown.unit}</i>
-      {stale && <em>{age(nowMs - cell.t_ns / 1e6, t.language)}</em>}
+      {stale && <em>{age(ageMsOf(cell, nowMs), t.language)}</em>}
     </span>
   );
 }
@@ -106,14 +123,13 @@ type Context = ReturnType<typeof useDevice>;
 
 function unknownTitle(cell: Cell | undefined, entry: EntryDoc, context: Context): string {
   if (!entry.readable) return context.t("page.table.write_only_title");
-  if (cell?.raw == null) return context.t("page.table.never_read");
-  return context.t("page.table.unknown_since_restart", { last: lineOf(shownOf(entry, cell.raw, context)) });
+  return context.t(cell ? "page.table.unknown_since_restart" : "page.table.never_read");
 }
 
 function valueTitle(raw: Raw, cell: Cell, nowMs: number, line: string, { t }: Context): string {
-  const ms = cell.t_ns / 1e6;
-  const source = t(`page.source.${cell.source.replaceAll("-", "_")}`);
-  const details = { raw, hex: cell.hex, source, time: timeOfDay(ms), age: age(nowMs - ms, t.language) };
+  const source = cell.source === null ? "–" : t(`page.source.${cell.source.replaceAll("-", "_")}`);
+  const time = timeOfDay((cell.t_ns ?? 0) / 1e6);
+  const details = { raw, hex: cell.hex, source, time, age: age(ageMsOf(cell, nowMs), t.language) };
   return [line, t("page.table.raw_title", details)].filter(Boolean).join("\n");
 }
 

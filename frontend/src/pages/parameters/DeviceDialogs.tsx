@@ -78,7 +78,12 @@ function CommandDialog({ name, tone, run, warning, onClose }: CommandProps) {
           </Group>
         )}
         {command.isSuccess && (
-          <Alert color="green" role="status" icon={<IconCircleCheck aria-hidden />} data-testid={`${name}-done`}>
+          <Alert
+            color="green"
+            role="status"
+            icon={<IconCircleCheck aria-hidden />}
+            data-testid={`${name}-done`}
+          >
             {t(key("done"), { device, seconds: figure(command.data.took_s, 1, t.language) })}
           </Alert>
         )}

@@ -7,7 +7,16 @@ import type { EntryDoc, Raw, WriteResult } from "../../api/types";
 import { useCell } from "../../live/live";
 import type { ParameterRow } from "../../model/rows";
 import { limitText, lineOf, shownOf } from "../../model/shown";
-import { defaultOf, isHex, isInteger, Misfit, parse, type Parsed, quantityOf, show } from "../../model/values";
+import {
+  defaultOf,
+  isHex,
+  isInteger,
+  Misfit,
+  parse,
+  type Parsed,
+  quantityOf,
+  show,
+} from "../../model/values";
 import { useDeviceName } from "../../ui/devices";
 import { ProblemAlert } from "../../ui/ProblemAlert";
 import { rawOf } from "./cellValue";
@@ -54,7 +63,11 @@ function Places({ entry }: { entry: EntryDoc }) {
   const storedState = cell?.stored ? t(`page.stored.${cell.stored.state}`) : t("page.table.stored_unknown");
   const facts: [string, string, string][] = [
     ["ram", line(raw), raw === null ? t("page.entry.unknown") : t("page.entry.raw", { raw, hex: cell?.hex })],
-    ["stored", entry.saved ? line(cell?.stored?.raw ?? null) : t("page.table.not_kept"), entry.saved ? storedState : ""],
+    [
+      "stored",
+      entry.saved ? line(cell?.stored?.raw ?? null) : t("page.table.not_kept"),
+      entry.saved ? storedState : "",
+    ],
     ["default", line(defaultOf(entry, context.node)), ""],
     ["limits", limitText(entry, context, true) || "–", ""],
     ["type", entry.type, t(`page.access.${entry.access.replace("(w)", "_factory")}`)],
@@ -95,7 +108,10 @@ function Editor({ entry, onClose }: { entry: EntryDoc; onClose: () => void }) {
   const { t, slug, doc, lookup } = context;
   const silent = useSilent(slug);
   const cell = useCell(slug, entry.address);
-  const [typed, setTyped] = useState(() => textToEdit(entry, rawOf(cell), context));
+  const [draft, setTyped] = useState<string | null>(null);
+  // Starts from the value in RAM, as soon as that is known, and does not follow it after that.
+  if (draft === null && rawOf(cell) !== null) setTyped(textToEdit(entry, rawOf(cell), context));
+  const typed = draft ?? "";
   const write = useMutation({ mutationFn: (raw: Raw) => commands.write(slug, entry.address, raw) });
   const parsed = parse(doc, entry, typed, lookup);
   const same = parsed.ok && parsed.raw === rawOf(cell);
@@ -112,7 +128,12 @@ function Editor({ entry, onClose }: { entry: EntryDoc; onClose: () => void }) {
       }}
     >
       <Stack gap="md">
-        <ValueEditor entry={entry} typed={typed} onTyped={change} error={refusal(parsed, typed, entry, context)} />
+        <ValueEditor
+          entry={entry}
+          typed={typed}
+          onTyped={change}
+          error={refusal(parsed, typed, entry, context)}
+        />
         {parsed.ok && <Preview entry={entry} from={rawOf(cell)} to={parsed.raw} />}
         <Progress entry={entry} pending={write.isPending} result={write.data} />
         {write.isError && <ProblemAlert error={write.error} title={t("page.write.failed")} />}
@@ -124,7 +145,6 @@ function Editor({ entry, onClose }: { entry: EntryDoc; onClose: () => void }) {
           <Button
             type="submit"
             disabled={!ready}
-            loading={write.isPending}
             leftSection={<IconSend size={17} aria-hidden />}
             data-testid="write"
           >
@@ -141,7 +161,12 @@ function textToEdit(entry: EntryDoc, raw: Raw | null, { lookup, t }: ReturnType<
 }
 
 /** Why the typed text is refused, the limit named; null while it is fine or nothing was typed yet. */
-function refusal(parsed: Parsed, typed: string, entry: EntryDoc, context: ReturnType<typeof useDevice>): string | null {
+function refusal(
+  parsed: Parsed,
+  typed: string,
+  entry: EntryDoc,
+  context: ReturnType<typeof useDevice>,
+): string | null {
   if (parsed.ok || (parsed.why === Misfit.Empty && typed === "")) return null;
   const { unit, decimals, scale } = quantityOf(entry, context.lookup);
   const step = show({ ...entry, hexadecimal: false, bits: null }, 1, context.lookup, context.t.language);
@@ -167,7 +192,15 @@ function Preview({ entry, from, to }: { entry: EntryDoc; from: Raw | null; to: R
 }
 
 /** Sent, then verified. The value itself is shown by the table, from the bus, and never from this answer. */
-function Progress({ entry, pending, result }: { entry: EntryDoc; pending: boolean; result: WriteResult | undefined }) {
+function Progress({
+  entry,
+  pending,
+  result,
+}: {
+  entry: EntryDoc;
+  pending: boolean;
+  result: WriteResult | undefined;
+}) {
   const context = useDevice();
   const { t } = context;
   if (pending) return <div role="status">{t("page.write.sent")}</div>;

@@ -33,6 +33,10 @@ export function ParameterTable(props: Props) {
   const context = useDevice();
   const t = useTexts();
   const columns = useMemo(() => columnsOf(context), [context]);
+  const shown = useMemo(
+    () => Object.values(Column).filter((column) => !props.hidden.includes(column)),
+    [props.hidden],
+  );
   const visibility = useMemo(() => Object.fromEntries(props.hidden.map((id) => [id, false])), [props.hidden]);
   const table = useTable({
     features,
@@ -43,7 +47,6 @@ export function ParameterTable(props: Props) {
     state: { sorting: props.sorting, columnVisibility: visibility },
     onSortingChange: (change) => props.onSort(typeof change === "function" ? change(props.sorting) : change),
   });
-  const shown = table.getVisibleLeafColumns().map((column) => column.id as Column);
   const sorted = table.getRowModel().rows;
   const groups = useMemo(() => context.doc.groups.map((group) => group.id), [context.doc]);
   const lines = useMemo(
@@ -56,13 +59,12 @@ export function ParameterTable(props: Props) {
     [sorted, groups, props.closed],
   );
   const { onLines } = props;
-  const shownKey = shown.join();
   useEffect(() => {
     onLines(
       sorted.map((row) => row.original),
-      shownKey.split(",") as Column[],
+      shown,
     );
-  }, [onLines, sorted, shownKey]);
+  }, [onLines, sorted, shown]);
 
   const tracks = shown.map((id) => WIDTHS[id]).join(" ");
   return (
@@ -117,7 +119,11 @@ function Lines({ lines, shown, tracks, children, silent, onOpen, onToggleGroup }
     virtual.scrollToIndex(next);
   };
   const onKeyDown = (event: KeyboardEvent) => {
-    if (event.target !== scroller.current || !act(event.key, lines[at], at, go, lines.length, onOpen, onToggleGroup)) return;
+    if (
+      event.target !== scroller.current ||
+      !act(event.key, lines[at], at, go, lines.length, onOpen, onToggleGroup)
+    )
+      return;
     event.preventDefault();
   };
   return (
@@ -133,7 +139,7 @@ function Lines({ lines, shown, tracks, children, silent, onOpen, onToggleGroup }
       onKeyDown={onKeyDown}
     >
       {children}
-      <div role="rowgroup" style={{ height: virtual.getTotalSize(), position: "relative" }}>
+      <div role="rowgroup" className={classes.lines} style={{ height: virtual.getTotalSize() }}>
         {virtual.getVirtualItems().map((item) => {
           const line = lines[item.index];
           if (!line) return null;
@@ -147,7 +153,13 @@ function Lines({ lines, shown, tracks, children, silent, onOpen, onToggleGroup }
           return line.kind === "group" ? (
             <Group key={item.key} line={line} common={common} onToggle={onToggleGroup} />
           ) : (
-            <div key={item.key} className={classes.row} aria-level={2} {...common} onClick={() => setActive(item.index)}>
+            <div
+              key={item.key}
+              className={classes.row}
+              aria-level={2}
+              {...common}
+              onClick={() => setActive(item.index)}
+            >
               {shown.map((column) => (
                 <div key={column} role="gridcell" data-column={column}>
                   <TableCell column={column} row={line.row} nowMs={nowMs} silent={silent} onOpen={onOpen} />
@@ -178,7 +190,12 @@ function Group({ line, common, onToggle }: GroupProps) {
   return (
     <div {...common} className={classes.group} aria-level={1} aria-expanded={line.open}>
       <div role="gridcell">
-        <button type="button" tabIndex={-1} onClick={() => onToggle(line.id)} data-testid={`group-${line.id}`}>
+        <button
+          type="button"
+          tabIndex={-1}
+          onClick={() => onToggle(line.id)}
+          data-testid={`group-${line.id}`}
+        >
           <Chevron size={17} aria-hidden />
           {line.title}
           <span className="dim">{line.count}</span>

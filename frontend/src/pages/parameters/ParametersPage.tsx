@@ -29,7 +29,10 @@ export function ParametersPage() {
   const turbine = useQuery(turbineQuery);
   const places = placesOf(turbine.data);
   const place = places.find((one) => one.device.slug === search.device) ?? places[0];
-  const description = useQuery({ ...descriptionQuery(place?.device.description_id ?? ""), enabled: place !== undefined });
+  const description = useQuery({
+    ...descriptionQuery(place?.device.description_id ?? ""),
+    enabled: place !== undefined,
+  });
   const error = turbine.error ?? description.error;
   return (
     <div className={classes.page}>
@@ -39,7 +42,9 @@ export function ParametersPage() {
         onPick={(device) => update({ device, edit: undefined })}
       />
       {error && <ProblemAlert error={error} title={t("page.table.not_loaded")} />}
-      {place && description.data && <Dictionary key={place.device.slug} place={place} doc={description.data} />}
+      {place && description.data && (
+        <Dictionary key={place.device.slug} place={place} doc={description.data} />
+      )}
       {!error && !description.data && (
         <Center h="60%">
           <Loader aria-label={t("page.loading")} />
@@ -64,8 +69,14 @@ function Dictionary({ place, doc }: { place: Place; doc: DescriptionDoc }) {
   const found = useMemo(() => filterRows(all, deferred), [all, deferred]);
   const rows = useOnlyChanged(found, search.only === "changed", context);
   const list = (text: string | undefined) => (text ? text.split(",") : []);
-  const closed = useMemo(() => new Set(deferred === "" ? list(search.closed) : []), [search.closed, deferred]);
-  const hidden = useMemo(() => (search.hide === undefined ? HIDDEN_AT_FIRST : list(search.hide)), [search.hide]);
+  const closed = useMemo(
+    () => new Set(deferred === "" ? list(search.closed) : []),
+    [search.closed, deferred],
+  );
+  const hidden = useMemo(
+    () => (search.hide === undefined ? HIDDEN_AT_FIRST : list(search.hide)),
+    [search.hide],
+  );
   const sorting = useMemo(() => sortingOf(search.sort), [search.sort]);
   const visible = useRef<{ rows: ParameterRow[]; columns: Column[] }>({ rows: [], columns: [] });
   const onLines = useCallback((shownRows: ParameterRow[], columns: Column[]) => {
@@ -81,15 +92,7 @@ function Dictionary({ place, doc }: { place: Place; doc: DescriptionDoc }) {
   const edited = all.find((row) => row.entry.address === search.edit);
   return (
     <DeviceContextOfTable value={context}>
-      <Toolbar
-        filter={typed}
-        onFilter={setTyped}
-        shown={rows.length}
-        total={all.length}
-        hidden={hidden}
-        visible={visible}
-        entries={doc.entries}
-      />
+      <Toolbar filter={typed} onFilter={setTyped} hidden={hidden} visible={visible} entries={doc.entries} />
       <StateLine slug={slug} />
       <ParameterTable
         rows={rows}
@@ -102,8 +105,15 @@ function Dictionary({ place, doc }: { place: Place; doc: DescriptionDoc }) {
         onOpen={onOpen}
         onLines={onLines}
       />
-      <p className={classes.legend}>{t("page.table.legend")}</p>
-      {edited && <EntryDialog key={edited.entry.address} row={edited} onClose={() => update({ edit: undefined })} />}
+      <p className={classes.legend}>
+        <strong role="status" data-testid="count">
+          {t("page.table.count", { shown: rows.length, total: all.length })}
+        </strong>
+        <span>{t("page.table.legend")}</span>
+      </p>
+      {edited && (
+        <EntryDialog key={edited.entry.address} row={edited} onClose={() => update({ edit: undefined })} />
+      )}
     </DeviceContextOfTable>
   );
 }
@@ -138,7 +148,9 @@ function useOnlyChanged(rows: readonly ParameterRow[], wanted: boolean, context:
   return useMemo(
     () =>
       wanted
-        ? rows.filter(({ entry }) => differsFromDefault(entry, store.cell(context.slug, entry.address), context.node))
+        ? rows.filter(({ entry }) =>
+            differsFromDefault(entry, store.cell(context.slug, entry.address), context.node),
+          )
         : rows,
     // The store is read afresh whenever values of the device came.
     // eslint-disable-next-line react-hooks/exhaustive-deps

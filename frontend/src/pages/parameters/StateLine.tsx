@@ -1,6 +1,7 @@
 import { Alert, Button, Progress } from "@mantine/core";
-import { IconClockOff, IconRefresh } from "@tabler/icons-react";
+import { IconAlertTriangle, IconClockOff, IconRefresh } from "@tabler/icons-react";
 import { useMemo } from "react";
+import type { Job } from "../../api/types";
 import { store, useDeviceVersion, useNodes, useServerNow } from "../../live/live";
 import { useTexts } from "../../texts/texts";
 import { age } from "../../ui/format";
@@ -15,9 +16,37 @@ export function StateLine({ slug }: { slug: string }) {
   const reading = useReadAll(slug);
   useReadAtFirstSight(slug, reading);
   const silent = useSilent(slug);
-  if (reading.running) return <Reading done={reading.job?.done ?? 0} total={reading.job?.total ?? 0} cancel={reading.cancel} />;
+  if (reading.running)
+    return <Reading done={reading.job?.done ?? 0} total={reading.job?.total ?? 0} cancel={reading.cancel} />;
   if (silent) return <Silent slug={slug} />;
-  return <Missing slug={slug} start={reading.start} />;
+  return (
+    <>
+      <Failures job={reading.job} />
+      <Missing slug={slug} start={reading.start} />
+    </>
+  );
+}
+
+/** What the last reading could not get, and why. */
+function Failures({ job }: { job: Job | undefined }) {
+  const t = useTexts();
+  if (!job || (job.failed.length === 0 && !job.error)) return null;
+  const reasons = [...(job.error ? [job.error] : []), ...job.failed];
+  const title = job.error ? t("page.read.failed") : t("page.read.some_failed", { count: job.failed.length });
+  return (
+    <details className={classes.failures} data-testid="read-failures">
+      <summary>
+        <IconAlertTriangle size={17} aria-hidden /> {title}
+      </summary>
+      <ul>
+        {reasons.map((failure) => (
+          <li key={failure.address}>
+            <b>{failure.address}</b> {t(failure.text_key, failure.details)}
+          </li>
+        ))}
+      </ul>
+    </details>
+  );
 }
 
 function Reading({ done, total, cancel }: { done: number; total: number; cancel: () => void }) {
@@ -38,8 +67,18 @@ function Silent({ slug }: { slug: string }) {
   const t = useTexts();
   const nowMs = useServerNow(500);
   const { ageMs } = heartbeatOf(useNodes().get(slug), nowMs);
-  const text = ageMs === null ? t("page.device.never_heard") : t("page.device.silent", { age: age(ageMs, t.language) });
-  return <Alert color="orange" variant="light" p="xs" icon={<IconClockOff aria-hidden />} title={text} data-testid="silent" />;
+  const text =
+    ageMs === null ? t("page.device.never_heard") : t("page.device.silent", { age: age(ageMs, t.language) });
+  return (
+    <Alert
+      color="orange"
+      variant="light"
+      p="xs"
+      icon={<IconClockOff aria-hidden />}
+      title={text}
+      data-testid="silent"
+    />
+  );
 }
 
 /** After a restart everything is unknown: say so and offer the one thing that helps. */
@@ -48,7 +87,8 @@ function Missing({ slug, start }: { slug: string; start: () => void }) {
   const { doc } = useDevice();
   const version = useDeviceVersion(slug);
   const missing = useMemo(
-    () => doc.entries.filter((entry) => entry.readable && store.cell(slug, entry.address)?.known !== true).length,
+    () =>
+      doc.entries.filter((entry) => entry.readable && store.cell(slug, entry.address)?.known !== true).length,
     // The store is read afresh whenever values of the device came.
     // eslint-disable-next-line react-hooks/exhaustive-deps
     [doc, slug, version],

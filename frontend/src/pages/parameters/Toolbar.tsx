@@ -1,5 +1,15 @@
 import { ActionIcon, Button, Checkbox, CloseButton, Menu, TextInput, Tooltip } from "@mantine/core";
-import { IconColumns3, IconCopy, IconDownload, IconFilter, IconRefresh, IconRotateClockwise2, IconDeviceFloppy } from "@tabler/icons-react";
+import {
+  IconCopy,
+  IconDeviceFloppy,
+  IconDownload,
+  IconFilter,
+  IconRefresh,
+  IconRotateClockwise2,
+  IconSquare,
+  IconSquareCheck,
+  IconTable,
+} from "@tabler/icons-react";
 import { type RefObject, useEffect, useRef, useState } from "react";
 import type { EntryDoc } from "../../api/types";
 import { usePageSearch } from "../../frame/search";
@@ -17,14 +27,12 @@ import { useSilent } from "./silent";
 interface Props {
   filter: string;
   onFilter: (typed: string) => void;
-  shown: number;
-  total: number;
   hidden: readonly string[];
   visible: RefObject<{ rows: ParameterRow[]; columns: Column[] }>;
   entries: readonly EntryDoc[];
 }
 
-export function Toolbar({ filter, onFilter, shown, total, hidden, visible, entries }: Props) {
+export function Toolbar({ filter, onFilter, hidden, visible, entries }: Props) {
   const t = useTexts();
   const [search, update] = usePageSearch();
   return (
@@ -36,11 +44,11 @@ export function Toolbar({ filter, onFilter, shown, total, hidden, visible, entri
         onChange={(event) => update({ only: event.currentTarget.checked ? "changed" : undefined })}
         data-testid="only-changed"
       />
-      <span className="dim" role="status" data-testid="count">
-        {t("page.table.count", { shown, total })}
-      </span>
-      <ColumnMenu hidden={hidden} onHide={(ids) => update({ hide: ids.length === 0 ? "none" : ids.join() })} />
-      <CopyExport visible={visible} />
+      <TableMenu
+        hidden={hidden}
+        onHide={(ids) => update({ hide: ids.length === 0 ? "none" : ids.join() })}
+        visible={visible}
+      />
       <span className={classes.spacer} />
       <DeviceActions entries={entries} />
     </div>
@@ -53,7 +61,8 @@ function FilterInput({ filter, onFilter }: { filter: string; onFilter: (typed: s
   useEffect(() => {
     // "/" goes to the filter, as long as nothing is being typed elsewhere.
     const focus = (event: KeyboardEvent) => {
-      const typing = event.target instanceof HTMLElement && event.target.closest("input, textarea, select, [role=dialog]");
+      const typing =
+        event.target instanceof HTMLElement && event.target.closest("input, textarea, select, [role=dialog]");
       if (event.key !== "/" || typing) return;
       event.preventDefault();
       input.current?.focus();
@@ -64,12 +73,16 @@ function FilterInput({ filter, onFilter }: { filter: string; onFilter: (typed: s
   return (
     <TextInput
       ref={input}
-      w={250}
+      className={classes.filter}
       aria-label={t("page.table.filter")}
       placeholder={t("page.table.filter_hint")}
       leftSection={<IconFilter size={17} aria-hidden />}
       rightSectionWidth={40}
-      rightSection={filter !== "" && <CloseButton aria-label={t("page.table.clear_filter")} onClick={() => onFilter("")} />}
+      rightSection={
+        filter !== "" && (
+          <CloseButton aria-label={t("page.table.clear_filter")} onClick={() => onFilter("")} />
+        )
+      }
       value={filter}
       onChange={(event) => onFilter(event.currentTarget.value)}
       data-testid="filter"
@@ -77,36 +90,52 @@ function FilterInput({ filter, onFilter }: { filter: string; onFilter: (typed: s
   );
 }
 
-function ColumnMenu({ hidden, onHide }: { hidden: readonly string[]; onHide: (ids: string[]) => void }) {
+interface MenuProps extends Pick<Props, "hidden" | "visible"> {
+  onHide: (ids: string[]) => void;
+}
+
+/** Columns to show, and the rows shown as text to take along. */
+function TableMenu({ hidden, onHide, visible }: MenuProps) {
   const t = useTexts();
+  const { copy, save } = useTakeAlong(visible);
   const choices = Object.values(Column).filter((column) => !ALWAYS_SHOWN.includes(column));
   const toggle = (column: Column) =>
     onHide(choices.filter((one) => (one === column ? !hidden.includes(one) : hidden.includes(one))));
   return (
-    <Menu closeOnItemClick={false} position="bottom-start">
+    <Menu position="bottom-start">
       <Menu.Target>
-        <Tooltip label={t("page.table.columns")}>
-          <ActionIcon aria-label={t("page.table.columns")}>
-            <IconColumns3 size={18} aria-hidden />
+        <Tooltip label={t("page.table.menu")}>
+          <ActionIcon aria-label={t("page.table.menu")} data-testid="table-menu">
+            <IconTable size={18} aria-hidden />
           </ActionIcon>
         </Tooltip>
       </Menu.Target>
       <Menu.Dropdown>
+        <Menu.Item mih={40} leftSection={<IconCopy size={17} aria-hidden />} onClick={copy}>
+          {t("page.table.copy")}
+        </Menu.Item>
+        <Menu.Item mih={40} leftSection={<IconDownload size={17} aria-hidden />} onClick={save}>
+          {t("page.table.export")}
+        </Menu.Item>
+        <Menu.Divider />
+        <Menu.Label>{t("page.table.columns")}</Menu.Label>
         {choices.map((column) => (
           <Menu.Item
             key={column}
             role="menuitemcheckbox"
             aria-checked={!hidden.includes(column)}
-            onClick={() => toggle(column)}
+            closeMenuOnClick={false}
             mih={40}
+            leftSection={
+              hidden.includes(column) ? (
+                <IconSquare size={17} aria-hidden />
+              ) : (
+                <IconSquareCheck size={17} aria-hidden />
+              )
+            }
+            onClick={() => toggle(column)}
           >
-            <Checkbox
-              checked={!hidden.includes(column)}
-              readOnly
-              tabIndex={-1}
-              label={t(`page.table.column.${column}`)}
-              style={{ pointerEvents: "none" }}
-            />
+            {t(`page.table.column.${column}`)}
           </Menu.Item>
         ))}
       </Menu.Dropdown>
@@ -114,7 +143,7 @@ function ColumnMenu({ hidden, onHide }: { hidden: readonly string[]; onHide: (id
   );
 }
 
-function CopyExport({ visible }: Pick<Props, "visible">) {
+function useTakeAlong(visible: Props["visible"]): { copy: () => void; save: () => void } {
   const t = useTexts();
   const context = useDevice();
   const table = () => {
@@ -124,25 +153,12 @@ function CopyExport({ visible }: Pick<Props, "visible">) {
   };
   const copy = () => {
     const lines = table();
-    const done = () => notify({ tone: "ok", title: t("page.table.copied", { rows: lines.length - 1 }), lines: [] });
+    const done = () =>
+      notify({ tone: "ok", title: t("page.table.copied", { rows: lines.length - 1 }), lines: [] });
     const failed = () => notify({ tone: "error", title: t("page.table.copy_failed"), lines: [] });
     navigator.clipboard.writeText(tsvOf(lines)).then(done, failed);
   };
-  const save = () => download(`${context.slug.replaceAll("/", "_")}.csv`, csvOf(table()));
-  return (
-    <div className={classes.icons}>
-      <Tooltip label={t("page.table.copy")}>
-        <ActionIcon aria-label={t("page.table.copy")} onClick={copy}>
-          <IconCopy size={18} aria-hidden />
-        </ActionIcon>
-      </Tooltip>
-      <Tooltip label={t("page.table.export")}>
-        <ActionIcon aria-label={t("page.table.export")} onClick={save}>
-          <IconDownload size={18} aria-hidden />
-        </ActionIcon>
-      </Tooltip>
-    </div>
-  );
+  return { copy, save: () => download(`${context.slug.replaceAll("/", "_")}.csv`, csvOf(table())) };
 }
 
 enum Dialog {
@@ -160,6 +176,7 @@ function DeviceActions({ entries }: { entries: readonly EntryDoc[] }) {
   return (
     <div className={classes.icons}>
       <Button
+        px="sm"
         variant="default"
         leftSection={<IconRefresh size={17} aria-hidden />}
         disabled={silent || reading.running}
@@ -169,6 +186,7 @@ function DeviceActions({ entries }: { entries: readonly EntryDoc[] }) {
         {t("page.read.all")}
       </Button>
       <Button
+        px="sm"
         leftSection={<IconDeviceFloppy size={17} aria-hidden />}
         disabled={silent}
         onClick={() => setDialog(Dialog.Save)}
@@ -177,6 +195,7 @@ function DeviceActions({ entries }: { entries: readonly EntryDoc[] }) {
         {t("page.save.open")}
       </Button>
       <Button
+        px="sm"
         variant="default"
         leftSection={<IconRotateClockwise2 size={17} aria-hidden />}
         disabled={silent}

@@ -33,7 +33,9 @@ function TextEditor({ entry, typed, onTyped, error }: Props) {
   return (
     <TextInput
       label={t("page.entry.new_value")}
-      description={limits === "" ? undefined : t("page.entry.allowed", { limits, unit: isHex(entry) ? "" : unit })}
+      description={
+        limits === "" ? undefined : t("page.entry.allowed", { limits, unit: isHex(entry) ? "" : unit })
+      }
       rightSection={unit !== "" && !isHex(entry) ? <Text size="sm">{unit}</Text> : undefined}
       rightSectionWidth={56}
       value={typed}
@@ -87,10 +89,11 @@ function BitsEditor(props: Props & { table: readonly BitDoc[] }) {
   const { entry, typed, onTyped, table } = props;
   const parsed = parse(doc, entry, typed, lookup);
   const raw = parsed.ok && typeof parsed.raw === "number" ? parsed.raw : null;
-  const set = (bit: BitDoc, value: number) => onTyped(hexadecimal(entry, withField(entry, raw ?? 0, bit, value)));
+  const set = (bit: BitDoc, value: number) =>
+    onTyped(hexadecimal(entry, withField(entry, raw ?? 0, bit, value)));
   return (
     <Stack gap="sm">
-      <fieldset className={classes.bits}>
+      <fieldset className={classes.bits} disabled={raw === null}>
         <legend>{t("page.entry.bits")}</legend>
         {table.map((bit) => (
           <BitField key={bit.bit} entry={entry} bit={bit} raw={raw} onSet={(value) => set(bit, value)} />
@@ -130,6 +133,10 @@ function BitField({ entry, bit, raw, onSet }: BitProps) {
     );
   }
   return (
-    <Checkbox label={label} checked={value === 1} onChange={(event) => onSet(event.currentTarget.checked ? 1 : 0)} />
+    <Checkbox
+      label={label}
+      checked={value === 1}
+      onChange={(event) => onSet(event.currentTarget.checked ? 1 : 0)}
+    />
   );
 }

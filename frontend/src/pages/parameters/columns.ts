@@ -65,13 +65,25 @@ export function columnsOf(context: DeviceContext) {
     helper.accessor((row) => row.order, { id, sortFn });
   return helper.columns([
     column(Column.Address, (a, b) => a.original.order - b.original.order),
-    column(Column.Name, byText((row) => row.title)),
+    column(
+      Column.Name,
+      byText((row) => row.title),
+    ),
     column(Column.Ram, byRaw(ram)),
     column(Column.Stored, byRaw(stored)),
     column(Column.Default, byRaw(standard)),
-    column(Column.Limits, byText((row) => limitText(row.entry, context, false))),
-    column(Column.Access, byText((row) => row.entry.access)),
-    column(Column.Section, byText((row) => row.entry.section)),
+    column(
+      Column.Limits,
+      byText((row) => limitText(row.entry, context, false)),
+    ),
+    column(
+      Column.Access,
+      byText((row) => row.entry.access),
+    ),
+    column(
+      Column.Section,
+      byText((row) => row.entry.section),
+    ),
   ]);
 }
 

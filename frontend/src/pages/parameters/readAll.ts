@@ -23,7 +23,11 @@ const runningKey = (slug: string) => ["reading", slug];
 
 export function useReadAll(slug: string): ReadAll {
   const t = useTexts();
-  const id = useQuery({ queryKey: runningKey(slug), queryFn: () => null as string | null, staleTime: Infinity }).data;
+  const id = useQuery({
+    queryKey: runningKey(slug),
+    queryFn: () => null as string | null,
+    staleTime: Infinity,
+  }).data;
   const job = useQuery(jobQuery(id ?? null)).data;
   const failed = (error: unknown) => {
     const story = storyOf(error, t);
@@ -56,7 +60,9 @@ export function useReadAtFirstSight(slug: string, reading: ReadAll): void {
   useEffect(() => {
     if (version === 0 || silent || running || offered.has(slug)) return;
     offered.add(slug);
-    const known = [...(store.cells(slug)?.values() ?? [])].filter((cell) => cell.known && cell.source.startsWith("sdo"));
+    const known = [...(store.cells(slug)?.values() ?? [])].filter(
+      (cell) => cell.known && cell.source === "sdo-read",
+    );
     if (known.length === 0) start();
   }, [version, silent, running, slug, start]);
 }

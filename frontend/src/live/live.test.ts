@@ -1,0 +1,163 @@
+import { beforeEach, describe, expect, it } from "vitest";
+import type { AxisData, ServerMessage, ValueData } from "../api/types";
+import { Backoff } from "./backoff";
+import { DeafnessTimer } from "./deafness";
+import { LiveStore } from "./store";
+import { Trace } from "./trace";
+
+describe("deafness", () => {
+  it("comes after one second without a message, and goes with the next", () => {
+    const timer = new DeafnessTimer(0);
+    expect(timer.check(1000).deaf).toBe(false);
+    expect(timer.check(1001)).toEqual({ deaf: true, lastHeardMs: null });
+    timer.heard(1500);
+    expect(timer.check(2500)).toEqual({ deaf: false, lastHeardMs: 1500 });
+    expect(timer.check(2501)).toEqual({ deaf: true, lastHeardMs: 1500 });
+  });
+});
+
+describe("back-off", () => {
+  it("doubles up to four seconds and starts again after a reset", () => {
+    const middle = new Backoff(() => 0.5);
+    expect([1, 2, 3, 4, 5, 6].map(() => middle.next())).toEqual([250, 500, 1000, 2000, 4000, 4000]);
+    middle.reset();
+    expect(middle.next()).toBe(250);
+  });
+
+  it("spreads by a quarter either way", () => {
+    expect(new Backoff(() => 0).next()).toBe(187.5);
+    expect(new Backoff(() => 1).next()).toBe(312.5);
+  });
+});
+
+const NOW_NS = 1_700_000_000_000_000_000;
+const PMC = "wtg-07/blade-1/pmc";
+let nowMs = 0;
+let flushes: (() => void)[] = [];
+let store: LiveStore;
+
+const flush = () => {
+  for (const one of flushes.splice(0)) one();
+};
+
+function send<T extends ServerMessage["type"]>(
+  type: T,
+  data: Extract<ServerMessage, { type: T }>["data"],
+  tNs = NOW_NS,
+) {
+  store.apply({ v: 1, ctx: "live", type, seq: 1, t_ns: tNs, data } as ServerMessage);
+}
+
+const value = (hex: string, change: Partial<ValueData> = {}): ValueData => ({
+  raw: parseInt(hex, 16),
+  hex,
+  t_ns: NOW_NS,
+  source: "sdo-read",
+  stored: null,
+  known: true,
+  stale: false,
+  ...change,
+});
+
+const axis = (position: number | null, stale = false) =>
+  ({ blade: 1, position_deg: position, demand_deg: 80, stale }) as AxisData;
+
+beforeEach(() => {
+  nowMs = 1000;
+  flushes = [];
+  store = new LiveStore(
+    (flushNow) => flushes.push(flushNow),
+    () => nowMs,
+  );
+});
+
+describe("store", () => {
+  it("tells listeners once a tick, however many messages came", () => {
+    let told = 0;
+    store.subscribe("axes", () => (told += 1));
+    for (let message = 0; message < 50; message += 1) send("axes", [axis(message)]);
+    expect(told).toBe(0);
+    expect(flushes).toHaveLength(1);
+    flush();
+    expect(told).toBe(1);
+    expect(store.axes.get(1)?.position_deg).toBe(49);
+    send("axes", [axis(50)]);
+    flush();
+    expect(told).toBe(2);
+  });
+
+  it("tells only those whose value came", () => {
+    const told: string[] = [];
+    store.subscribe(`value:${PMC}/6065`, () => told.push("6065"));
+    store.subscribe(`value:${PMC}/6067`, () => told.push("6067"));
+    const leave = store.subscribe(`value:${PMC}/6065`, () => told.push("gone"));
+    leave();
+    send("values", { device: PMC, full: false, values: { "6065": value("0A") } });
+    flush();
+    expect(told).toEqual(["6065"]);
+  });
+
+  it("merges deltas, and replaces all with the snapshot after a new subscription", () => {
+    send("values", { device: PMC, full: true, values: { "6065": value("0A"), "6067": value("0B") } });
+    send("values", { device: PMC, full: false, values: { "6065": value("0C") } });
+    expect(store.cell(PMC, "6067")?.hex).toBe("0B");
+    send("values", { device: PMC, full: true, values: { "6065": value("0D") } });
+    expect(store.cell(PMC, "6065")?.hex).toBe("0D");
+    expect(store.cell(PMC, "6067")).toBeUndefined();
+  });
+
+  it("marks a change of a known value, and neither the first reading nor a re-reading", () => {
+    send("values", { device: PMC, full: false, values: { "6065": value("0A") } });
+    expect(store.cell(PMC, "6065")?.changedAtMs).toBeNull();
+    send("values", { device: PMC, full: false, values: { "6065": value("0A") } });
+    expect(store.cell(PMC, "6065")?.changedAtMs).toBeNull();
+    send("values", { device: PMC, full: false, values: { "6065": value("0B") } });
+    expect(store.cell(PMC, "6065")?.changedAtMs).toBe(NOW_NS / 1e6);
+    send("values", { device: PMC, full: false, values: { "6065": value("0B", { known: false }) } });
+    send("values", { device: PMC, full: false, values: { "6065": value("0C") } });
+    expect(store.cell(PMC, "6065")?.changedAtMs).toBe(NOW_NS / 1e6);
+  });
+
+  it("follows the server's clock", () => {
+    send("heartbeat", {});
+    nowMs += 250;
+    expect(store.serverNowMs()).toBe(NOW_NS / 1e6 + 250);
+  });
+
+  it("keeps events newest first and tells none twice after a new connection", () => {
+    const event = (tNs: number) => ({
+      t_ns: tNs,
+      severity: "info" as const,
+      device: null,
+      text_key: "k",
+      details: {},
+    });
+    for (const tNs of [1, 3, 2, 3, 1]) send("event", event(tNs));
+    expect(store.events.map((one) => one.t_ns)).toEqual([3, 2, 1]);
+    expect(new Set(store.events.map((one) => one.id)).size).toBe(3);
+  });
+
+  it("leaves a gap in the trace while the position is stale", () => {
+    send("axes", [axis(80)], 1e9);
+    send("axes", [axis(80, true)], 1.1e9);
+    expect(store.traces.get(1)?.columns()[1]).toEqual([80, null]);
+  });
+});
+
+describe("trace", () => {
+  it("keeps a minute", () => {
+    const trace = new Trace();
+    for (let tenth = 0; tenth <= 700; tenth += 1) trace.push(tenth / 10, tenth, null);
+    const [times] = trace.columns();
+    expect(times[0]).toBe(10);
+    expect(times.at(-1)).toBe(70);
+  });
+
+  it("breaks the line where messages were missing, and refuses to go back", () => {
+    const trace = new Trace();
+    trace.push(0, 1, 1);
+    trace.push(5, 2, 2);
+    trace.push(4, 3, 3);
+    expect(trace.columns()[1]).toEqual([1, null, 2]);
+  });
+});
