@@ -1,0 +1,84 @@
+"""STOP and FEATHER reach every axis, by PDO where it is in force, else by SDO, whatever else is going on."""
+
+from __future__ import annotations
+
+import asyncio
+
+from app.model.address import Address
+from app.service.backup import read_devices
+from app.service.connection import Connection
+from app.service.stop import Command, Path, command_all
+from app.twins.line import Fault, drop
+from app.wire.nmt import NmtCommand
+from tests.e2e.test_interoperation import until
+from tests.service.conftest import Served
+
+CONTROLWORD = Address(0x6040)
+ANGLE = Address(0x6064)
+
+
+async def enable(connection: Connection, node: int) -> None:
+    """Bring an axis to operation enabled."""
+    target = next(one for one in connection.targets if one.node == node)
+    driver = connection.driver(target)
+    for word in (0x0106, 0x0107, 0x010F):
+        await driver.write(node, CONTROLWORD, word.to_bytes(2, "little"))
+
+
+async def statusword(connection: Connection, node: int) -> int:
+    target = next(one for one in connection.targets if one.node == node)
+    return int.from_bytes(await connection.driver(target).read(node, Address(0x6041)), "little")
+
+
+async def test_stop_takes_the_pdo_of_operational_nodes_and_sdo_for_others(connection: Connection) -> None:
+    driver = connection.buses["can0"].driver
+    driver.nmt(NmtCommand.START, 11)
+    for node in (11, 12):
+        await enable(connection, node)
+    await until(lambda: (view := connection.live.node("can0", 11)) is not None and view.state is not None)
+    assert await statusword(connection, 11) & 0x6F == 0x27
+    outcomes = await command_all(connection.axes(), Command.STOP, connection.journal, connection.stamper)
+    by_device = {outcome.device.split("/")[1]: outcome for outcome in outcomes}
+    assert by_device["blade-1"].how is Path.RPDO
+    assert by_device["blade-2"].how is Path.SDO
+    assert all(outcome.confirmed_t_ns is not None for outcome in outcomes)
+    for node in (11, 12):
+        assert await statusword(connection, node) & 0x6F != 0x27
+
+
+async def test_stop_goes_before_a_running_backup(connection: Connection) -> None:
+    await enable(connection, 11)
+    pairs = [(connection.driver(target), target) for target in connection.targets]
+    backup = asyncio.create_task(read_devices(pairs))
+    await until(lambda: connection.buses["can0"].frames > 200)
+    outcomes = await command_all(connection.axes(), Command.STOP, connection.journal, connection.stamper)
+    assert not backup.done(), "the backup was still running"
+    assert all(outcome.error is None for outcome in outcomes)
+    assert await statusword(connection, 11) & 0x6F != 0x27
+    reports = await backup
+    assert all(len(report.values) > 200 for report in reports), "and it went on afterwards"
+
+
+async def test_feather_drives_the_blade_to_90_degrees(connection: Connection) -> None:
+    outcomes = await command_all(connection.axes(), Command.FEATHER, connection.journal, connection.stamper)
+    assert [outcome.error for outcome in outcomes] == [None, None, None]
+    target = connection.target("wtg-07/blade-1/pmc")
+    driver = connection.driver(target)
+
+    async def angle() -> int:
+        return int.from_bytes(await driver.read(11, ANGLE), "little", signed=True)
+
+    for _ in range(400):
+        if await angle() >= 8990:
+            return
+        await asyncio.sleep(0.05)
+    raise AssertionError(f"the blade stands at {await angle()}")
+
+
+async def test_one_dead_axis_does_not_keep_the_others_from_stopping(connection: Connection, served: Served) -> None:
+    await enable(connection, 12)
+    served.spoil(Fault(lambda can: can.can_id == 0x60B, drop, None))
+    outcomes = await command_all(connection.axes(), Command.STOP, connection.journal, connection.stamper)
+    failed = [outcome.device for outcome in outcomes if outcome.how is Path.FAILED]
+    assert failed == ["wtg-07/blade-1/pmc"]
+    assert await statusword(connection, 12) & 0x6F != 0x27
