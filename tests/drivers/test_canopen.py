@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import asyncio
+import sys
 import time
 from collections.abc import AsyncIterator, Callable, Iterator
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, closing
+from pathlib import Path
 
 import pytest
 
+from app.drivers.can_config import CanConfig, CanInterface
 from app.drivers.canopen import CanOpenDriver
 from app.drivers.contract import Driver, LinkState, MasterSign, Written
 from app.drivers.table import driver_class
@@ -20,6 +23,7 @@ from app.wire import sdo
 from app.wire.frame import Can, Direction, Frame
 from app.wire.nmt import NmtCommand, NmtState
 from tests.drivers.contract_suite import Bench, DriverContract
+from tests.drivers.test_can_port import SlcanAdapter
 from tests.drivers.wire import DEADLINE_S, PMC, PMM, Wire, stamper, until, wire
 
 WINDOW = Address(0x6065)
@@ -106,6 +110,21 @@ async def test_nothing_is_sent_while_listening(line: Wire) -> None:
     assert driver.nodes_heard == (3,)
     assert await driver.read(11, WINDOW)
     await driver.close()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no pty")
+async def test_it_listens_in_the_silent_mode_of_an_adapter_that_has_one(tmp_path: Path) -> None:
+    tty = tmp_path / "tty"
+    with closing(SlcanAdapter(tty)) as adapter:
+        driver = CanOpenDriver(CanConfig(CanInterface.SLCAN, str(tty)), stamper(), listen_s=0.1)
+        await driver.connect()
+        await asyncio.to_thread(adapter.wait_for, b"O")
+        commands = list(adapter.commands)
+        assert commands.index(b"L") < commands.index(b"O")
+        assert driver.status.state is LinkState.CONNECTED
+        driver.send_raw(Can(0x60B, b"\x40"))
+        await asyncio.to_thread(adapter.wait_for, b"t60B140")
+        await driver.close()
 
 
 @pytest.mark.parametrize(
