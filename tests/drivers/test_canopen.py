@@ -186,14 +186,14 @@ async def test_a_late_acknowledge_completes_nothing_else(line: Wire) -> None:
     """A's acknowledge arrives while B is pending, and B is then aborted by the device."""
     head = sdo.download_response(WINDOW)[:4]
     abort_head = sdo.abort(POSITION, 0)[:4]
-    line.inject(Fault(lambda can: can.can_id == 0x58B and can.data[:4] == head, delay(300_000_000)))
-    line.inject(Fault(lambda can: can.can_id == 0x58B and can.data[:4] == abort_head, delay(300_000_000)))
+    line.inject(Fault(lambda can: can.can_id == 0x58B and can.data[:4] == head, delay(800_000_000)))
+    line.inject(Fault(lambda can: can.can_id == 0x58B and can.data[:4] == abort_head, delay(1_500_000_000)))
     seen: list[bytes] = []
     async with driver_on(line) as driver:
         driver.subscribe(lambda frames: seen.extend(f.payload.data for f in frames if isinstance(f.payload, Can)))
         data = (4711).to_bytes(4, "little")
         a = asyncio.ensure_future(driver.write(11, WINDOW, data, timeout_s=0.2))
-        b = asyncio.ensure_future(driver.write(11, POSITION, bytes(4), timeout_s=1.0))
+        b = asyncio.ensure_future(driver.write(11, POSITION, bytes(4), timeout_s=5.0))
         assert await a is Written.READ_BACK
         with pytest.raises(SdoAbortError) as refused:
             await b
