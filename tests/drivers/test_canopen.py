@@ -237,10 +237,10 @@ async def test_nmt_commands_reach_the_node(line: Wire) -> None:
 
 
 async def test_two_nodes_take_hardly_longer_than_one() -> None:
-    addresses = [entry.address for entry in PMC if entry.access.readable][:50]
+    addresses = [entry.address for entry in PMC if entry.access.readable][:30]
     with wire() as line:
         for node in (11, 12):
-            line.add_pmc(node, turnaround_ns=8_000_000)
+            line.add_pmc(node, turnaround_ns=20_000_000)
         async with driver_on(line) as driver:
             start = time.monotonic()
             await driver.read_many(11, addresses)
