@@ -39,6 +39,8 @@ LISTEN_S: Final = 0.5
 """How long is listened before anything is sent; a heartbeat of 500 ms is heard once."""
 SAVE_TIMEOUT_NS: Final = 10_000_000_000
 """The least time-out of a write to 1010h or 1011h: non-volatile memory is slow."""
+SHORT_LIST: Final = 16
+"""A list of more objects is bulk: it waits for everything else."""
 _SLOW: Final = frozenset({0x1010, 0x1011})
 _PROGRESS_S: Final = 0.05
 _HEARTBEAT_BASE: Final = 0x700
@@ -185,9 +187,9 @@ class CanOpenDriver:
 
     # -- objects ----------------------------------------------------------------
 
-    async def read(self, node: int, address: Address, timeout_s: float | None = None) -> bytes:
-        """One object, by SDO upload. Raises SdoAbortError, NoAnswerError, BusLostError, ConsentError."""
-        result = (await self.read_many(node, (address,), timeout_s))[address]
+    async def read(self, node: int, address: Address, timeout_s: float | None = None, urgent: bool = False) -> bytes:
+        """See Driver. By SDO upload. Raises SdoAbortError, NoAnswerError, BusLostError, ConsentError."""
+        result = (await self.read_many(node, (address,), timeout_s, urgent=urgent))[address]
         if isinstance(result, HubsideError):
             raise result
         return result
@@ -198,14 +200,15 @@ class CanOpenDriver:
         addresses: Iterable[Address],
         timeout_s: float | None = None,
         on_progress: ProgressCallback | None = None,
+        urgent: bool = False,
     ) -> dict[Address, bytes | HubsideError]:
-        """Objects of one node, one after another; ``timeout_s`` is for each. Gather calls to read nodes in parallel."""
-        self._require_active(node)
+        """See Driver. ``timeout_s`` is for each object; a long list lets short calls go first between two objects."""
+        self._require_active(node, asked=not urgent)
         known_ns = self._timeouts_ns.get(node, {})
         timeouts_ns = {address: _timeout_ns(timeout_s, known_ns.get(address)) for address in addresses}
         results: dict[Address, bytes | HubsideError] = {}
         steps = read_steps(node, timeouts_ns, results, self._client.counters, self.bus)
-        running = asyncio.ensure_future(self._run(node, steps))
+        running = asyncio.ensure_future(self._run(node, steps, urgent, bulk=len(timeouts_ns) > SHORT_LIST))
         await self._watch_progress(running, results, len(timeouts_ns), on_progress)
         return results
 
@@ -297,7 +300,9 @@ class CanOpenDriver:
 
     # -- the way to the receive thread ------------------------------------------------
 
-    async def _run(self, node: int, steps: Steps[T], urgent: bool = False, fenced: bool = True) -> T:
+    async def _run(
+        self, node: int, steps: Steps[T], urgent: bool = False, fenced: bool = True, bulk: bool = False
+    ) -> T:
         loop = asyncio.get_running_loop()
         future: asyncio.Future[T] = loop.create_future()
         self._pending.add(future)
@@ -310,7 +315,7 @@ class CanOpenDriver:
         def hand_over(result: T | None, error: Exception | None) -> None:
             loop.call_soon_threadsafe(_settle, future, result, error)
 
-        job: Job[T] = Job(steps, on_done, urgent, fenced)
+        job: Job[T] = Job(steps, on_done, urgent, fenced, bulk)
         self._port.call_soon(lambda: self._client.submit(node, job))
         try:
             return await future

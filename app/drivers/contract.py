@@ -115,8 +115,8 @@ class Driver(Protocol):
     async def close(self, timeout_s: float = 5.0) -> None:
         """End all that runs and close the bus."""
 
-    async def read(self, node: int, address: Address, timeout_s: float | None = None) -> bytes:
-        """One object as bytes of the wire."""
+    async def read(self, node: int, address: Address, timeout_s: float | None = None, urgent: bool = False) -> bytes:
+        """One object as bytes of the wire. ``urgent``: see ``write``."""
 
     async def read_many(
         self,
@@ -124,6 +124,7 @@ class Driver(Protocol):
         addresses: Iterable[Address],
         timeout_s: float | None = None,
         on_progress: ProgressCallback | None = None,
+        urgent: bool = False,
     ) -> dict[Address, bytes | HubsideError]:
         """Many objects of one node, in order: a value or the error of each. Several nodes may be read at a time."""
 

@@ -53,9 +53,10 @@ class Job(Generic[T]):
 
     ``urgent``: interrupts what runs at the node and goes first; its write is never held back by a fence.
     ``fenced`` False: a late answer of an earlier request is as good as a fresh one (only for scans).
+    ``bulk``: lets whatever else waits for the node go first after each of its transfers.
     """
 
-    __slots__ = ("ask", "fenced", "on_done", "resume", "steps", "urgent")
+    __slots__ = ("ask", "bulk", "fenced", "on_done", "resume", "steps", "urgent")
 
     def __init__(
         self,
@@ -63,13 +64,15 @@ class Job(Generic[T]):
         on_done: Callable[[T | None, Exception | None], None],
         urgent: bool = False,
         fenced: bool = True,
+        bulk: bool = False,
     ) -> None:
         self.steps = steps
+        self.bulk = bulk
         self.on_done = on_done
         self.urgent = urgent
         self.fenced = fenced
         self.ask: Transfer | None = None
-        """A transfer asked for and not sent yet, because the job was interrupted at its fence."""
+        """A transfer asked for and not sent yet, because something else went first."""
         self.resume: End | None = None
 
 
@@ -197,7 +200,11 @@ class _Channel:
             self.job = None
             self._deliver(job, None, raised)
         else:
-            self._begin(ask)
+            if job.bulk and any(not other.bulk for other in self.queue):
+                job.ask, self.job = ask, None
+                self.queue.append(job)
+            else:
+                self._begin(ask)
 
     def _deliver(self, job: Job[Any], result: Any, error: Exception | None) -> None:
         try:

@@ -78,9 +78,10 @@ def line() -> Iterator[Wire]:
         yield built
 
 
-def test_the_table_knows_the_driver() -> None:
-    found: type[Driver] = driver_class(Bus.CANOPEN)
-    assert found is CanOpenDriver
+def test_the_table_knows_the_driver(line: Wire) -> None:
+    assert driver_class(Bus.CANOPEN) is CanOpenDriver
+    kept_to: Driver = CanOpenDriver(line.config, stamper())  # the type checker holds it to the contract
+    assert kept_to.status.state is LinkState.CLOSED
 
 
 def test_a_bus_without_a_driver_is_a_usage_error() -> None:
@@ -153,6 +154,7 @@ async def test_another_master_needs_consent(line: Wire, frame: Can, sign: Master
     with pytest.raises(ConsentError):
         driver.nmt(NmtCommand.START, 11)
     assert await driver.write(11, WINDOW, bytes(4), urgent=True) is Written.ACKNOWLEDGED
+    assert await driver.read(11, WINDOW, urgent=True) == bytes(4)
     driver.grant_consent()
     assert await driver.read(11, WINDOW) == bytes(4)
     await driver.close()

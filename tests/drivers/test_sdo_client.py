@@ -272,6 +272,37 @@ def test_an_urgent_write_interrupts_a_list_which_then_goes_on() -> None:
     assert results == {address: device.store.read(address) for address in addresses} | {WINDOW: results[WINDOW]}
 
 
+def test_a_short_call_goes_between_two_objects_of_a_long_list() -> None:
+    rig = Rig()
+    device = rig.node(delays_ns=iter([2 * MS] * 1000))
+    timeouts = {entry.address: DEFAULT_TIMEOUT_NS for entry in device.store.description if entry.access.readable}
+    results: RESULTS = {}
+    backup = Outcome()
+    rig.client.submit(11, Job(read_steps(11, timeouts, results, rig.client.counters), backup, bulk=True))
+    rig.run(100 * MS)
+    for _ in range(3):
+        short, outcome = read(rig, WINDOW, TIMEOUT_6066)
+        written = write(rig, WINDOW, u32(99))
+        rig.run_until(lambda done=outcome, also=written: done.done and also.done, limit_ns=13 * MS)  # type: ignore[misc]
+        assert set(short) == {WINDOW, TIMEOUT_6066}
+        rig.run(10 * MS)
+    assert not backup.done
+    rig.run_until(lambda: backup.done)
+    assert list(results) == list(timeouts)
+    assert all(isinstance(result, bytes) for result in results.values())
+    assert rig.client.counters.interrupted == 0
+
+
+def test_two_long_lists_of_a_node_are_both_read() -> None:
+    rig = Rig()
+    rig.node()
+    outcomes = [Outcome(), Outcome()]
+    for outcome in outcomes:
+        timeouts = dict.fromkeys((WINDOW, TIMEOUT_6066, POSITION), DEFAULT_TIMEOUT_NS)
+        rig.client.submit(11, Job(read_steps(11, timeouts, {}, rig.client.counters), outcome, bulk=True))
+    rig.run_until(lambda: all(outcome.done for outcome in outcomes))
+
+
 def test_a_write_interrupted_by_an_urgent_one_is_decided_by_reading() -> None:
     rig = Rig()
     device = rig.node()

@@ -19,7 +19,7 @@ from app.twins.line import Fault, drop
 from app.twins.object_store import RefusedAccessError
 from app.wire import sdo
 from app.wire.frame import Can
-from tests.drivers.rig import MS, Outcome, Rig, S, u32
+from tests.drivers.rig import MS, NAME, Outcome, Rig, S, u32
 
 OBJECTS = tuple(Address(0x1016, sub) for sub in (1, 2, 3))
 
@@ -138,3 +138,26 @@ def check_read(result: bytes | HubsideError) -> None:
         assert len(result) == 4
     else:
         assert isinstance(result, NoAnswerError)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.tuples(st.binary(max_size=8), st.integers(0, 900)), max_size=30))
+def test_stray_frames_bring_no_job_down(strays: list[tuple[bytes, int]]) -> None:
+    """Whatever else is sent with the node's answer identifier, every job ends, once."""
+    rig = Rig()
+    rig.node(delays_ns=chain([600 * MS, 2 * MS, 600 * MS], repeat(MS)))
+    other = rig.line.attach(lambda _can, _t_ns: None, ())
+    for data, at_ms in strays:
+        other.send(Can(0x58B, data), at_ms * MS)
+    outcomes = [Outcome() for _ in range(4)]
+    counters = rig.client.counters
+    for number, outcome in enumerate(outcomes[:2]):
+        steps = write_steps(11, OBJECTS[0], u32(number), DEFAULT_TIMEOUT_NS, DEFAULT_TIMEOUT_NS, Verify.EQUAL, counters)
+        rig.client.submit(11, Job(steps, outcome))
+    for outcome in outcomes[2:]:
+        timeouts = dict.fromkeys((*OBJECTS, NAME), DEFAULT_TIMEOUT_NS)
+        rig.client.submit(11, Job(read_steps(11, timeouts, {}, counters), outcome, bulk=True))
+    rig.run_until(lambda: all(outcome.done for outcome in outcomes))
+    rig.run(S)
+    assert [outcome.calls for outcome in outcomes] == [1, 1, 1, 1]
+    assert not any(isinstance(outcome.error, ValueError | KeyError | AttributeError) for outcome in outcomes)
