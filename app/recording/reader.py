@@ -27,6 +27,7 @@ from app.recording.cdr import (
     decode_clock,
     decode_telegram,
     decode_texts,
+    frame_id,
 )
 from app.recording.chunks import Body, chunk_data, split_body
 from app.recording.content import (
@@ -58,9 +59,9 @@ from app.recording.scan import (
     scan,
     unmap,
 )
-from app.recording.schemas import CAN_FRAME, CLOCK_TOPIC, EVENTS_TOPIC, STATE_TOPIC, TELEGRAM
+from app.recording.schemas import CAN_FRAME, CLOCK, EVENT, STATE, TELEGRAM, MessageType
 from app.recording.summary import MAGIC, Summary
-from app.wire.frame import Frame
+from app.wire.frame import Direction, Frame
 
 _PREFIX: Final = RECORD_PREFIX.size + MESSAGE_FIXED
 _T = TypeVar("_T")
@@ -267,7 +268,7 @@ class Recording:
             t_ns, _, text = decode_texts(payload, 1)
             return Keyframe(t_ns, json.loads(text))
 
-        return self._messages(STATE_TOPIC, decode, start_ns, end_ns)
+        return self._messages(STATE, decode, start_ns, end_ns)
 
     def events(self, start_ns: int | None = None, end_ns: int | None = None) -> Iterator[Event]:
         """The events by time."""
@@ -276,17 +277,17 @@ class Recording:
             t_ns, bus, kind, text = decode_texts(payload, 2)
             return Event(t_ns, EventKind(kind), bus, json.loads(text))
 
-        return self._messages(EVENTS_TOPIC, decode, start_ns, end_ns)
+        return self._messages(EVENT, decode, start_ns, end_ns)
 
     def clocks(self, start_ns: int | None = None, end_ns: int | None = None) -> Iterator[ClockReading]:
         """The pairings of the clocks by time."""
-        return self._messages(CLOCK_TOPIC, decode_clock, start_ns, end_ns)
+        return self._messages(CLOCK, decode_clock, start_ns, end_ns)
 
     def _messages(
-        self, topic: str, decode: Callable[[bytes], _T], start_ns: int | None, end_ns: int | None
+        self, message_type: MessageType, decode: Callable[[bytes], _T], start_ns: int | None, end_ns: int | None
     ) -> Iterator[_T]:
         return self._merged(
-            lambda chunk: self.channels[chunk.channel_id].topic == topic,
+            lambda chunk: self._schema_name(chunk) == message_type.name,
             lambda body: ((t_ns, decode(payload)) for t_ns, payload in _payloads(body)),
             start_ns,
             end_ns,
@@ -338,6 +339,9 @@ class Recording:
         if stride != layout.itemsize or len(body.data) % stride:
             return ((t_ns, decode_can_payload(payload)) for t_ns, payload in _payloads(body))
         records = np.frombuffer(body.data, dtype=layout)
+        known = [frame_id(channel.topic[1:], direction).encode() for direction in Direction]
+        if not np.isin(records["frame_id"], known).all():
+            return ((t_ns, decode_can_payload(payload)) for t_ns, payload in _payloads(body))
         return zip(body.times.tolist(), decode_can(channel.topic[1:], records), strict=True)
 
     # Bytes of the file.

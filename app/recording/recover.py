@@ -25,7 +25,7 @@ from app.recording.file_lock import lock_file
 from app.recording.mcap_file import McapFile, sync_directory
 from app.recording.scan import Bytes, Scan, is_finished, map_file, parse, scan, unmap
 from app.recording.schemas import CAN_FRAME, TELEGRAM
-from app.recording.summary import MAGIC, Summary
+from app.recording.summary import MAGIC, Summary, record_bytes
 
 TAIL_SUFFIX: Final = ".tail"
 DAMAGED_SUFFIX: Final = ".damaged"
@@ -169,7 +169,11 @@ def _copy(path: Path, data: Bytes, result: Scan, rewritten: Body | None, now_ns:
     copy, aside = _copy_name(path), _free_name(path, DAMAGED_SUFFIX)
     copy.unlink(missing_ok=True)
     file = McapFile(copy, result.library)
-    _copy_items(file, data, result)
+    try:
+        _copy_items(file, data, result)
+    except OSError:
+        file.close()
+        raise
     lost = sum(damage.length for damage in result.damages)
     note = Recovery(path, RecoveryKind.REPAIRED, len(data) - lost, lost, 0, 0, None, aside)
     return _complete(file, result, rewritten, note, now_ns)
@@ -179,8 +183,10 @@ def _copy_items(file: McapFile, data: Bytes, result: Scan) -> None:
     old, new = result.summary, file.summary
     new.schemas, new.channels, new.messages = old.schemas, old.channels, old.messages
     moved: dict[int, int] = {}
+    for declaration in (*new.schemas.values(), *new.channels.values()):  # all of them, for one may be damaged
+        file.add_copy(record_bytes(declaration))
     for item in result.items:
-        if item.opcode is not Opcode.HEADER:
+        if item.opcode not in (Opcode.HEADER, Opcode.SCHEMA, Opcode.CHANNEL):
             moved[item.offset] = file.add_copy(data[item.offset : item.offset + item.length])
         if item.opcode is Opcode.CHUNK:
             chunk = old.chunks[len(new.chunks)]

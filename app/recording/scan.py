@@ -36,6 +36,15 @@ from mcap.records import (
 from app.errors import RecordingError
 from app.recording.cdr import RECORD_PREFIX
 from app.recording.chunks import Body, chunk_data, message_index, partial_body, split_body
+from app.recording.schemas import (
+    ALL_TYPES,
+    CAN_FRAME,
+    FIXED_TOPICS,
+    MESSAGE_ENCODING,
+    SCHEMA_ENCODING,
+    TELEGRAM,
+    bus_topic,
+)
 from app.recording.summary import FOOTER_SIZE, MAGIC, Summary
 
 Bytes = bytes | mmap.mmap
@@ -44,6 +53,11 @@ _CHUNK_MARK_AT: Final = 37  # where the mark stands in a chunk record
 _CHUNK_PACKED_AT: Final = 49  # where the compressed bytes begin in a chunk record
 _DATA_END_SIZE: Final = 13
 _UNREADABLE = (McapError, struct.error, ValueError, OverflowError)
+KNOWN_SCHEMAS: Final = {
+    number: Schema(id=number, data=known.text.encode(), encoding=SCHEMA_ENCODING, name=known.name)
+    for number, known in enumerate(ALL_TYPES, 1)
+}
+"""The schemas are the same in every recording, so that a damaged declaration costs nothing."""
 _R = TypeVar("_R", bound=McapRecord)
 _DATA_OPCODES: Final = frozenset(
     {
@@ -154,8 +168,8 @@ class _Scanner:
         # A damaged data section may have lost the declaration of a topic; the summary repeats them.
         known = read_summary(data)
         if known is not None:
-            self._result.summary.schemas.update(known.schemas)
             self._result.summary.channels.update(known.channels)
+        self._result.summary.schemas.update(KNOWN_SCHEMAS)
 
     def run(self) -> Scan:
         at = len(MAGIC)
@@ -201,9 +215,12 @@ class _Scanner:
             result.library = parse(Header, body).library
         elif opcode is Opcode.SCHEMA:
             schema = parse(Schema, body)
-            result.summary.schemas.setdefault(schema.id, schema)
+            if schema != KNOWN_SCHEMAS.get(schema.id):
+                raise ValueError("schema that no recording has")
         elif opcode is Opcode.CHANNEL:
             channel = parse(Channel, body)
+            if not _plausible(channel):
+                raise ValueError("topic that no recording has")
             result.summary.channels.setdefault(channel.id, channel)
         elif opcode is Opcode.ATTACHMENT:
             result.summary.add_attachment(parse_attachment(body), at, end - at)
@@ -290,6 +307,16 @@ class _Scanner:
             if body is not None and body.channel_id in self._result.summary.channels:
                 self._result.partial = body
         return True
+
+
+def _plausible(channel: Channel) -> bool:
+    """Whether a recording can have this topic. No CRC covers a declaration, so what it says twice must agree."""
+    schema = KNOWN_SCHEMAS.get(channel.schema_id)
+    if schema is None or channel.message_encoding != MESSAGE_ENCODING:
+        return False
+    if schema.name in (CAN_FRAME.name, TELEGRAM.name):
+        return channel.topic == bus_topic(channel.metadata.get("bus", ""))
+    return FIXED_TOPICS.get(channel.topic) == schema.name
 
 
 def parse_attachment(body: bytes) -> Attachment:

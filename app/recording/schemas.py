@@ -53,6 +53,11 @@ STATE = MessageType("hubside_msgs/msg/State", "std_msgs/Header header\nstring js
 EVENT = MessageType("hubside_msgs/msg/Event", "std_msgs/Header header\nstring kind\nstring json\n" + _HEADER)
 
 ALL_TYPES = (CAN_FRAME, CLOCK, STATE, EVENT, TELEGRAM)
+"""In the order of their schema ids, which begin at 1. The order is part of the format."""
+
+
+FIXED_TOPICS = {CLOCK_TOPIC: CLOCK.name, STATE_TOPIC: STATE.name, EVENTS_TOPIC: EVENT.name}
+"""The topics beside those of the buses, and their types."""
 
 
 def bus_topic(bus: str) -> str:
