@@ -140,8 +140,17 @@ def check_read(result: bytes | HubsideError) -> None:
         assert isinstance(result, NoAnswerError)
 
 
+likely_answers = st.builds(
+    lambda head, address, rest: bytes([head]) + sdo.upload_request(address)[1:4] + rest,
+    st.integers(0, 255),
+    st.sampled_from([*OBJECTS, NAME, Address(0x1000)]),
+    st.binary(min_size=4, max_size=4),
+)
+strays_of_a_node = st.lists(st.tuples(likely_answers | st.binary(max_size=8), st.integers(0, 1900)), max_size=30)
+
+
 @settings(max_examples=60, deadline=None)
-@given(st.lists(st.tuples(st.binary(max_size=8), st.integers(0, 900)), max_size=30))
+@given(strays_of_a_node)
 def test_stray_frames_bring_no_job_down(strays: list[tuple[bytes, int]]) -> None:
     """Whatever else is sent with the node's answer identifier, every job ends, once."""
     rig = Rig()
