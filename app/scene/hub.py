@@ -14,6 +14,7 @@ import numpy as np
 import viser
 
 from app.scene import geometry
+from app.scene.client import CAMERA_M, FOV_RAD, LOOK_AT_M
 from app.scene.server import start_server
 
 
@@ -38,6 +39,7 @@ class BladePose:
 
 
 BLADES: Final = (1, 2, 3)
+_LABEL_SCALE: Final = 1.3
 _HUB_COLOUR: Final = (176, 184, 192)
 _BEARING_COLOUR: Final = (88, 98, 110)
 _MARK_COLOUR: Final = (255, 200, 60)
@@ -87,8 +89,9 @@ class HubScene:
         scene.set_up_direction("+z")
         scene.world_axes.visible = False
         scene.configure_default_lights(True)
-        server.initial_camera.position = (-19.0, -13.0, 7.0)
-        server.initial_camera.look_at = (0.0, 0.0, 0.6)
+        server.initial_camera.fov = FOV_RAD
+        server.initial_camera.position = CAMERA_M
+        server.initial_camera.look_at = LOOK_AT_M
         spinner = geometry.spinner()
         scene.add_mesh_simple("/hub", spinner.vertices, spinner.faces, color=_HUB_COLOUR)
         for blade in BLADES:
@@ -112,4 +115,6 @@ class HubScene:
         lifted = pointer.vertices + np.array([0.0, 0.0, geometry.HUB_RADIUS_M + 0.3], dtype=np.float32)
         scene.add_mesh_simple(f"{root}/pitch/pointer", lifted, pointer.faces, color=_MARK_COLOUR)
         place = (0.0, 0.0, geometry.HUB_RADIUS_M + geometry.SPAN_M * 0.62)
-        self._label[blade] = scene.add_label(f"{root}/label", f"{blade}", position=place)
+        self._label[blade] = scene.add_label(
+            f"{root}/label", f"{blade}", position=place, font_screen_scale=_LABEL_SCALE, anchor="center-center"
+        )

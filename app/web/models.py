@@ -173,6 +173,8 @@ class ValuesData(BaseModel):
 class _Envelope(BaseModel):
     """``seq`` counts the messages of one connection; ``t_ns`` is the bench's time when it was sent."""
 
+    model_config = ConfigDict(json_schema_serialization_defaults_required=True)
+
     v: Literal[1] = API_VERSION
     ctx: Literal["live"] = "live"
     seq: int

@@ -62,11 +62,18 @@ class InvalidRequestError(errors.RefusedError):
     code: ClassVar[str] = "invalid"
 
 
+class SceneGoneError(errors.NoAnswerError):
+    """The 3D server does not answer. Details: reason."""
+
+    code: ClassVar[str] = "scene_gone"
+
+
 _OWN_STATUS: Final[Mapping[type[HubsideError], HTTPStatus]] = {
     NotFoundError: HTTPStatus.NOT_FOUND,
     UnauthorisedError: HTTPStatus.UNAUTHORIZED,
     ForbiddenHostError: HTTPStatus.FORBIDDEN,
     InvalidRequestError: HTTPStatus.UNPROCESSABLE_ENTITY,
+    SceneGoneError: HTTPStatus.BAD_GATEWAY,
 }
 
 

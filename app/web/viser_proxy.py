@@ -17,23 +17,15 @@ from fastapi.responses import RedirectResponse
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
+from app.scene.client import bare_page
 from app.scene.hub import HubScene
 from app.scene.server import SECRET_HEADER
-from app.web.problem import NotFoundError
+from app.web.problem import NotFoundError, SceneGoneError
 
 log = logging.getLogger(__name__)
 
 TIMEOUT_S: Final = 10.0
 _UPSTREAM: Final = "127.0.0.1"
-BARE: Final = """<style>
-html, body, #root { height: 100%; margin: 0; overflow: hidden; }
-body :not(canvas):not(:has(canvas)):not(style):not(script) { display: none !important; }
-</style><script>
-// The client reconnects only while its window has the focus, which a docked frame seldom has.
-Document.prototype.hasFocus = () => true;
-</script>"""
-"""Put into the client's page. The rule names no class of the client, for they change with every version: whatever
-neither is nor holds a canvas (control panel, notices, dialogs) is not shown."""
 
 
 def viser_router(scene: HubScene) -> APIRouter:
@@ -57,15 +49,18 @@ class _Proxy:
         return RedirectResponse(f"/viser/{query}", 307)
 
     async def page(self, request: Request, path: str) -> Response:
-        """A file of the client, as the 3D server has it; compressed where the browser takes that."""
+        """A file of the client. Raises NotFoundError or SceneGoneError."""
         url = f"http://{_UPSTREAM}:{self._scene.port}/{path}"
         headers = {SECRET_HEADER: self._scene.secret, "Accept-Encoding": "identity"}
-        async with httpx.AsyncClient(trust_env=False, timeout=TIMEOUT_S) as client:
-            answer = await client.get(url, headers=headers)
+        try:
+            async with httpx.AsyncClient(trust_env=False, timeout=TIMEOUT_S) as client:
+                answer = await client.get(url, headers=headers)
+        except httpx.HTTPError as error:
+            raise SceneGoneError(reason=type(error).__name__) from error
         if answer.status_code != 200:
             raise NotFoundError(what=request.url.path)
         media_type = answer.headers.get("content-type", "application/octet-stream")
-        body = _bare(answer.content) if media_type.startswith("text/html") else answer.content
+        body = bare_page(answer.content) if media_type.startswith("text/html") else answer.content
         return Response(body, media_type=media_type, headers={"Cache-Control": "no-store"})
 
     async def socket(self, socket: WebSocket) -> None:
@@ -89,12 +84,6 @@ class _Proxy:
         async with upstream:
             await socket.accept(upstream.subprotocol)
             await _pass_on(socket, upstream)
-
-
-def _bare(page: bytes) -> bytes:
-    """The client's page with our rules at the end of its head."""
-    head, mark, rest = page.partition(b"<head>")
-    return head + mark + BARE.encode() + rest
 
 
 async def _pass_on(socket: WebSocket, upstream: ClientConnection) -> None:
