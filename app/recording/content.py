@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gzip
 import json
+import zlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
@@ -56,6 +58,31 @@ class AttachedFile(NamedTuple):
     name: str
     media_type: str
     data: bytes
+
+
+GZIP_FROM: Final = 1024  # bytes; below, packing gains nothing
+_GZIP_TYPE: Final = "application/gzip; content="
+_GZIP_SUFFIX: Final = ".gz"
+
+
+def to_stored(attached: AttachedFile) -> AttachedFile:
+    """The form in the file: gzip where it is not tiny, for every part bears all attachments."""
+    name, media_type, data = attached
+    if len(data) < GZIP_FROM:
+        return attached
+    return AttachedFile(name + _GZIP_SUFFIX, _GZIP_TYPE + media_type, gzip.compress(data, mtime=0))
+
+
+def from_stored(stored: AttachedFile) -> AttachedFile:
+    """What ``to_stored`` got. Raises ``ValueError`` where the packed bytes make no sense."""
+    name, media_type, data = stored
+    if not media_type.startswith(_GZIP_TYPE):
+        return stored
+    try:
+        plain = gzip.decompress(data)
+    except (OSError, EOFError, zlib.error) as error:
+        raise ValueError(f"attachment {name}: {error}") from error
+    return AttachedFile(name.removesuffix(_GZIP_SUFFIX), media_type.removeprefix(_GZIP_TYPE), plain)
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,7 @@ from app.recording.content import (
     Event,
     RecordingInfo,
     to_json,
+    to_stored,
 )
 from app.recording.mcap_file import LIBRARY, McapFile, sync_directory
 from app.recording.schemas import (
@@ -123,7 +124,7 @@ class Part:
 
     def attach(self, attachment: AttachedFile, t_ns: int) -> None:
         """Puts a file into the file; the next chunk makes it durable."""
-        name, media_type, data = attachment
+        name, media_type, data = to_stored(attachment)
         self._file.add_attachment(Attachment(t_ns, t_ns, name, media_type, data))
 
     def _channel(self, topic: str, message_type: MessageType) -> int:

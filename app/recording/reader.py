@@ -43,6 +43,7 @@ from app.recording.content import (
     EventKind,
     Keyframe,
     RecordingInfo,
+    from_stored,
 )
 from app.recording.part import Identity
 from app.recording.scan import (
@@ -217,7 +218,14 @@ class Recording:
 
     def attachments(self) -> list[AttachedFile]:
         """The files inside the file; damaged ones are left out and listed in ``damages``."""
-        return [AttachedFile(record.name, record.media_type, record.data) for record in self.attachment_records()]
+        found = []
+        for record in self.attachment_records():
+            stored = AttachedFile(record.name, record.media_type, record.data)
+            try:
+                found.append(from_stored(stored))
+            except ValueError as error:
+                raise self._error(0, str(error)) from error
+        return found
 
     # Records as they stand in the file, for who writes another file of them.
 

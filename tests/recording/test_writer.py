@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import gzip
 import os
 from itertools import pairwise
 from pathlib import Path
@@ -30,6 +31,20 @@ def test_metadata_attachments_and_totals_come_back(tmp_path: Path) -> None:
         totals = recording.totals
         assert totals is not None and (totals.frames, totals.lost) == (100, 0)
         assert list(recording.frames()) == bench.written
+
+
+def test_large_attachments_are_packed_and_come_back_plain(tmp_path: Path) -> None:
+    large = b'{"name": "value"}' * 5000
+    bench = Bench(tmp_path)
+    bench.core.attach("descriptions/oat-pmc.json", "application/json", large)
+    bench.run(1.0)
+    bench.core.shut()
+    assert files(tmp_path)[0].stat().st_size < len(large) / 5
+    with open_recording(files(tmp_path)[0], strict=True) as recording:
+        assert recording.attachments() == [("descriptions/oat-pmc.json", "application/json", large)]
+        (stored,) = recording.attachment_records()
+    assert stored.name == "descriptions/oat-pmc.json.gz"
+    assert gzip.decompress(stored.data) == large
 
 
 def test_clocks_are_paired_every_100_ms_with_the_adapters_time(tmp_path: Path) -> None:
