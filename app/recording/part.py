@@ -43,6 +43,8 @@ from app.wire.frame import Can, Frame
 
 CHUNK_FRAMES: Final = 8192  # a backlog is cut into chunks of at most this many frames
 
+BUSY_MESSAGES: Final = 2400  # more than a full bus of 500 kbit/s sends between two chunks: processor time goes first
+
 
 @dataclass
 class Batch:
@@ -81,7 +83,7 @@ class Part:
         self.frames = 0
         self.rejected = 0
         self._file = McapFile(path, library)
-        self._packer = compressor(Level.LIVE)
+        self._packer, self._fast_packer = compressor(Level.LIVE), compressor(Level.BUSY)
         self._channels: dict[tuple[str, MessageType], int] = {}
         try:
             self._write_head(identity, info, attachments)
@@ -173,7 +175,8 @@ class Part:
             self._append_body(message_body(self._channel(topic, message_type), messages))
 
     def _append_body(self, body: Body) -> None:
-        self._file.add_chunk(encode_chunk(body, self._packer, with_index=True))
+        packer = self._packer if len(body.times) < BUSY_MESSAGES else self._fast_packer
+        self._file.add_chunk(encode_chunk(body, packer, with_index=True))
         self._file.sync()
 
     def finish(self, t_ns: int, lost: int) -> None:
