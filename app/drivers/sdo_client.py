@@ -232,7 +232,7 @@ class _Channel:
         self.wanted = ask
         usable = [a for a in FENCES if a != ask.address]
         free = [a for a in usable if not self.unanswered.has(sdo.upload_request(a)[1:4], Kind.UPLOAD)]
-        self._send(Upload((free or usable)[0], DEFAULT_TIMEOUT_NS))
+        self._send(Upload((free or usable)[0], max(DEFAULT_TIMEOUT_NS, ask.timeout_ns)))
 
     def _send(self, transfer: Transfer) -> None:
         self.transfer = transfer
@@ -367,17 +367,17 @@ class SdoClient:
     def on_frames(self, frames: Sequence[Frame]) -> None:
         """Take what the bus received."""
         by_response = self._by_response
-        for frame in frames:
-            can = frame.payload
-            if not isinstance(can, Can) or frame.direction is not Direction.RX:
+        for _, _, direction, can, _ in frames:
+            if direction is not Direction.RX or type(can) is not Can:
                 continue
-            if can.extended or can.remote or can.error:
+            can_id, data, extended, remote, error, _ = can
+            if extended or remote or error:
                 continue
-            channel = by_response.get(can.can_id)
+            channel = by_response.get(can_id)
             if channel is not None:
-                self._guarded(channel.on_response, can.data)
-            elif can.can_id > _BOOT_BASE and can.data == b"\0":
-                booted = self._channels.get(can.can_id - _BOOT_BASE)
+                self._guarded(channel.on_response, data)
+            elif can_id > _BOOT_BASE and data == b"\0":
+                booted = self._channels.get(can_id - _BOOT_BASE)
                 if booted is not None:
                     self._guarded(_Channel.on_boot_up, booted)
 

@@ -220,6 +220,18 @@ def test_a_read_is_asked_once_more_behind_a_fence() -> None:
     assert (rig.client.counters.read_retries, rig.client.counters.fences) == (1, 1)
 
 
+def test_a_fence_is_as_patient_as_the_request_behind_it() -> None:
+    rig = Rig()
+    device = rig.node(delays_ns=iter([700 * MS] * 50))
+    results, hasty = read(rig, WINDOW)
+    rig.run_until(lambda: hasty.done)
+    assert isinstance(results[WINDOW], NoAnswerError)
+    patient, answers = Outcome(), RESULTS()
+    rig.client.submit(11, Job(read_steps(11, {WINDOW: 2 * S}, answers, rig.client.counters), patient))
+    rig.run_until(lambda: patient.done)
+    assert answers == {WINDOW: device.store.read(WINDOW)}
+
+
 def test_an_object_that_never_answers_does_not_end_the_list() -> None:
     rig = Rig()
     device = rig.node()
