@@ -3,7 +3,7 @@ import { IconHandStop, IconWind } from "@tabler/icons-react";
 import { useAxes, useHearing, useLink } from "../live/live";
 import { useTexts } from "../texts/texts";
 import classes from "./Frame.module.css";
-import { mayMove } from "./motion";
+import { mayMove } from "../live/axis";
 import { Halt, useHalt, useLendStop } from "./stop";
 
 /** Always at the same place. Grey only where nothing is connected; a deaf page still tries. */

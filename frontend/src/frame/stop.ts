@@ -4,7 +4,7 @@ import { useEffect } from "react";
 import { commands } from "../api/client";
 import type { StopResult } from "../api/types";
 import { store } from "../live/live";
-import { mayMove } from "./motion";
+import { mayMove } from "../live/axis";
 import { type Translate, useTexts } from "../texts/texts";
 import { useDeviceName } from "../ui/devices";
 import { notify } from "../ui/notices";

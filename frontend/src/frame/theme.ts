@@ -40,6 +40,7 @@ export const theme = createTheme({
         overlay: { top: TOP },
         inner: { top: TOP, height: `calc(100% - ${TOP})` },
         content: { background: PANEL },
+        header: { background: PANEL },
       },
     },
     Tooltip: { defaultProps: { openDelay: 300, withArrow: true, multiline: true, maw: 340 } },

@@ -14,6 +14,7 @@ import type {
   ValueData,
   ValuesData,
 } from "../api/types";
+import { followsDemand } from "./axis";
 import { Trace } from "./trace";
 
 export const MAX_EVENTS = 500;
@@ -122,7 +123,8 @@ export class LiveStore {
       const trace = this.traces.get(axis.blade) ?? new Trace();
       this.traces.set(axis.blade, trace);
       // A stale position is a gap in the trace, never the last value drawn on.
-      trace.push(tNs / 1e9, axis.stale ? null : axis.position_deg, axis.stale ? null : axis.demand_deg);
+      const demand = axis.stale || !followsDemand(axis) ? null : axis.demand_deg;
+      trace.push(tNs / 1e9, axis.stale ? null : axis.position_deg, demand);
     }
     this.mark("axes");
   }

@@ -135,7 +135,6 @@ describe("parse", () => {
       bit_count: 64,
       range: [0, 2 ** 64],
       decimals: 0,
-      decimals: 0,
       scale: 1,
       unit: "",
       minimum: null,

@@ -2,6 +2,7 @@ import { IconAlertOctagon } from "@tabler/icons-react";
 import { lazy, Suspense } from "react";
 import type { AxisData, DeviceRef, StationRef } from "../../api/types";
 import { useAxes, useNodes, useServerNow } from "../../live/live";
+import { followsDemand } from "../../live/axis";
 import { figure } from "../../model/values";
 import { useTexts } from "../../texts/texts";
 import { stationName } from "../../ui/devices";
@@ -65,7 +66,7 @@ function Angle({ axis }: { axis: AxisData | undefined }) {
         ) : (
           <>
             <span className="dim">{t("page.card.demand")}</span>
-            <span data-testid="demand">
+            <span data-testid="demand" data-stale={!axis || !followsDemand(axis)} className={classes.figure}>
               {axis?.demand_deg == null ? DASH : `${figure(axis.demand_deg, 2, t.language)}°`}
             </span>
           </>

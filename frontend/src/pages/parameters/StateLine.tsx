@@ -1,14 +1,14 @@
 import { Alert, Button, Progress } from "@mantine/core";
 import { IconAlertTriangle, IconClockOff, IconRefresh } from "@tabler/icons-react";
 import { useMemo } from "react";
-import type { Job } from "../../api/types";
+import type { EntryDoc, Job } from "../../api/types";
 import { store, useDeviceVersion, useNodes, useServerNow } from "../../live/live";
 import { useTexts } from "../../texts/texts";
 import { age } from "../../ui/format";
 import { heartbeatOf } from "../overview/nodes";
 import { useDevice } from "./context";
 import classes from "./Parameters.module.css";
-import { useReadAll, useReadAtFirstSight } from "./readAll";
+import { type ReadAll, useReadAll, useReadAtFirstSight } from "./readAll";
 import { useSilent } from "./silent";
 
 /** One line between tools and table: how far a reading is, or what is missing and the next step. */
@@ -22,7 +22,7 @@ export function StateLine({ slug }: { slug: string }) {
   return (
     <>
       <Failures job={reading.job} />
-      <Missing slug={slug} start={reading.start} />
+      <Missing slug={slug} reading={reading} />
     </>
   );
 }
@@ -81,26 +81,37 @@ function Silent({ slug }: { slug: string }) {
   );
 }
 
-/** After a restart everything is unknown: say so and offer the one thing that helps. */
-function Missing({ slug, start }: { slug: string; start: () => void }) {
+/** After a restart everything is unknown: say so and offer the one thing that helps. What refused is not asked again. */
+function Missing({ slug, reading }: { slug: string; reading: ReadAll }) {
   const t = useTexts();
   const { doc } = useDevice();
   const version = useDeviceVersion(slug);
+  const refused = reading.job?.failed;
   const missing = useMemo(
-    () =>
-      doc.entries.filter((entry) => entry.readable && store.cell(slug, entry.address)?.known !== true).length,
+    () => missingOf(doc.entries, slug, new Set(refused?.map((failure) => failure.address))),
     // The store is read afresh whenever values of the device came.
     // eslint-disable-next-line react-hooks/exhaustive-deps
-    [doc, slug, version],
+    [doc, slug, version, refused],
   );
-  if (version === 0 || missing === 0) return null;
+  if (version === 0 || missing.length === 0) return null;
   const all = doc.entries.filter((entry) => entry.readable).length;
   return (
     <div className={classes.reading} data-testid="missing">
-      <span>{t("page.read.missing", { missing, all })}</span>
-      <Button variant="light" leftSection={<IconRefresh size={17} aria-hidden />} onClick={start}>
+      <span>{t("page.read.missing", { missing: missing.length, all })}</span>
+      <Button
+        leftSection={<IconRefresh size={17} aria-hidden />}
+        onClick={() => reading.start(missing.length === all ? null : missing)}
+        data-testid="read-missing"
+      >
         {t("page.read.now")}
       </Button>
     </div>
   );
+}
+
+function missingOf(entries: readonly EntryDoc[], slug: string, refused: ReadonlySet<string>): string[] {
+  return entries
+    .filter((entry) => entry.readable && store.cell(slug, entry.address)?.known !== true)
+    .map((entry) => entry.address)
+    .filter((address) => !refused.has(address));
 }

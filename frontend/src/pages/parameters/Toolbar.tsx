@@ -180,7 +180,7 @@ function DeviceActions({ entries }: { entries: readonly EntryDoc[] }) {
         variant="default"
         leftSection={<IconRefresh size={17} aria-hidden />}
         disabled={silent || reading.running}
-        onClick={reading.start}
+        onClick={() => reading.start(null)}
         data-testid="read-all"
       >
         {t("page.read.all")}

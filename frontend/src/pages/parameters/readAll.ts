@@ -15,7 +15,8 @@ const offered = new Set<string>();
 export interface ReadAll {
   job: Job | undefined;
   running: boolean;
-  start: () => void;
+  /** Reads these addresses, or all where null. */
+  start: (addresses: string[] | null) => void;
   cancel: () => void;
 }
 
@@ -34,7 +35,7 @@ export function useReadAll(slug: string): ReadAll {
     notify({ tone: "error", title: t("page.read.failed"), lines: [story.happened, story.next] });
   };
   const start = useMutation({
-    mutationFn: () => commands.read(slug, null),
+    mutationFn: (addresses: string[] | null) => commands.read(slug, addresses),
     onSuccess: (begun) => {
       queryClient.setQueryData(["job", begun.id], begun);
       queryClient.setQueryData(runningKey(slug), begun.id);
@@ -63,6 +64,6 @@ export function useReadAtFirstSight(slug: string, reading: ReadAll): void {
     const known = [...(store.cells(slug)?.values() ?? [])].filter(
       (cell) => cell.known && cell.source === "sdo-read",
     );
-    if (known.length === 0) start();
+    if (known.length === 0) start(null);
   }, [version, silent, running, slug, start]);
 }

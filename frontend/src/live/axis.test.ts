@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
 import type { AxisData } from "../api/types";
-import { mayMove } from "./motion";
+import { followsDemand, mayMove } from "./axis";
 
 const axis = (state: string | null, velocity: number | null = 0) =>
   ({ state, velocity_dps: velocity }) as AxisData;
@@ -30,5 +30,13 @@ describe("what may move", () => {
     ];
     expect(mayMove(rest.map((name) => axis(`cia402.${name}`, 0.01)))).toBe(false);
     expect(mayMove([])).toBe(false);
+  });
+});
+
+describe("a demand", () => {
+  it("is in force only while operation is enabled", () => {
+    expect(followsDemand(axis("axis_state.operation_enabled"))).toBe(true);
+    expect(followsDemand(axis("axis_state.switched_on"))).toBe(false);
+    expect(followsDemand(axis(null))).toBe(false);
   });
 });
