@@ -223,7 +223,9 @@ def test_a_read_is_asked_once_more_behind_a_fence() -> None:
 def test_a_fence_is_as_patient_as_the_request_behind_it() -> None:
     rig = Rig()
     device = rig.node(delays_ns=iter([700 * MS] * 50))
-    results, hasty = read(rig, WINDOW)
+    hasty, results = Outcome(), RESULTS()
+    steps = read_steps(11, {WINDOW: 300 * MS}, results, rig.client.counters)
+    rig.client.submit(11, Job(steps, hasty, fenced=False))
     rig.run_until(lambda: hasty.done)
     assert isinstance(results[WINDOW], NoAnswerError)
     patient, answers = Outcome(), RESULTS()
