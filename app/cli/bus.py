@@ -13,6 +13,7 @@ from contextlib import asynccontextmanager
 from typing import Any
 
 from app.cli.output import Output, error_text
+from app.cli.runtime import spare_collector
 from app.cli.targets import add_connection, bare_turbine, descriptions_for, find_device, scanned_turbine, site_turbine
 from app.drivers.contract import FoundNode
 from app.errors import HubsideError, NoAnswerError, SdoAbortError, UsageError
@@ -85,6 +86,7 @@ async def connected(
         turbine = scanned_turbine(arguments, found)
         _all_there(nodes, found, turbine)
     connection = _connection(arguments, turbine, arguments.record if record is None else record)
+    spare_collector()
     async with connection:
         yield connection
 

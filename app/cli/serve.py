@@ -59,9 +59,10 @@ def _twins(arguments: argparse.Namespace, state: Path) -> Iterator[str]:
     """Twins in a process of their own, on the usual port or, where that is taken, on a free one."""
     error = ""
     for port in (TWIN_PORT, 0):
-        command = [sys.executable, "-m", "app.cli", "twin", "oat", "--json", "--state", str(state)]
+        command = [sys.executable, "-m", "app.cli", "twin", "oat", "--json", "--while-stdin", "--state", str(state)]
         command += ["--can", f"socketcand:127.0.0.1:{port}", "--turnaround-ms", str(arguments.turnaround_ms)]
-        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        pipe = subprocess.PIPE
+        with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, text=True) as process:
             try:
                 line = process.stdout.readline() if process.stdout is not None else ""
                 if line:

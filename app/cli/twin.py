@@ -30,6 +30,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     oat.add_argument("--state", type=Path, metavar="DIR", help="where saved parameters are kept")
     oat.add_argument("--bitrate", type=int, default=500_000)
     oat.add_argument("--turnaround-ms", type=float, default=1.0, help="time a drive takes to answer")
+    oat.add_argument("--while-stdin", action="store_true", help="end when standard input ends, as the caller has")
     oat.add_argument("--factory", action="store_true", help="allow writing of r(w) objects")
     parser.set_defaults(run=run)
 
@@ -44,6 +45,8 @@ def run(arguments: argparse.Namespace, output: Output) -> int:
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
+    if arguments.while_stdin:
+        threading.Thread(target=_end_with_stdin, args=(stop,), daemon=True).start()
     line = CanLine(arguments.bitrate)
     turbine = build_turbine(
         line,
@@ -66,6 +69,12 @@ def run(arguments: argparse.Namespace, output: Output) -> int:
         stop.wait()
     turbine.power_off()
     return 0
+
+
+def _end_with_stdin(stop: threading.Event) -> None:
+    """A caller that was killed closes our input; twins without a caller would keep its port for ever."""
+    sys.stdin.read()
+    stop.set()
 
 
 def _announce(address: str, devices: int, bitrate: int, output: Output) -> None:
