@@ -11,6 +11,7 @@ from mcap.stream_reader import StreamReader
 from app.recording.chunks import chunk_data
 from app.recording.content import AttachedFile, Keyframe
 from app.recording.reader import open_recording
+from app.wire.frame import Can
 from tests.recording.make_golden import ATTACHMENTS, GOLDEN, INFO, STATE, T_NS, clocks, events, frames, make
 from tests.recording.rig import by_mcap
 
@@ -65,3 +66,12 @@ def test_the_bytes_of_a_can_message_are_those_of_the_contract() -> None:
         + b"\x00\x00\x00\x02"  # is_rtr, is_extended, is_error, dlc
         + b"\x01\x0b" + bytes(6)
     )  # fmt: skip
+
+
+def test_the_sample_of_six_nodes_is_whole() -> None:
+    with open_recording(GOLDEN.with_name("oat-six-nodes.mcap"), strict=True) as recording:
+        payloads = [frame.payload for frame in recording.frames()]
+        answering = {can.can_id & 0x7F for can in payloads if isinstance(can, Can) and can.can_id & 0x780 == 0x580}
+        assert answering == {1, 2, 3, 11, 12, 13}
+        assert len(list(recording.keyframes())) == 2
+        assert {each.name for each in recording.attachments()} == {"oat-pmm.json", "oat-pmc.json"}
