@@ -11,7 +11,7 @@ import { useTexts } from "../../texts/texts";
 import { useDeviceName } from "../../ui/devices";
 import { HoldButton } from "../../ui/HoldButton";
 import { ProblemAlert } from "../../ui/ProblemAlert";
-import { isUnsaved } from "./cellValue";
+import { isStoredUnknown, isUnsaved } from "./cellValue";
 import { useDevice } from "./context";
 
 interface Props {
@@ -115,7 +115,12 @@ function UnsavedList({ entries, name }: { entries: readonly EntryDoc[]; name: "s
   const { slug } = useDevice();
   useDeviceVersion(slug);
   const unsaved = entries.filter((entry) => isUnsaved(entry, store.cell(slug, entry.address)));
-  if (unsaved.length === 0) return <Text className="dim">{t(`page.${name}.no_unsaved`)}</Text>;
+  const unknown = entries.some((entry) => isStoredUnknown(entry, store.cell(slug, entry.address)));
+  if (unsaved.length === 0) {
+    return (
+      <Text className="dim">{t(unknown ? `page.${name}.stored_unknown` : `page.${name}.no_unsaved`)}</Text>
+    );
+  }
   const warning = name === "restart";
   return (
     <Alert

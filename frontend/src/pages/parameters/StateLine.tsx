@@ -1,5 +1,5 @@
 import { Alert, Button, Progress } from "@mantine/core";
-import { IconAlertTriangle, IconClockOff, IconRefresh } from "@tabler/icons-react";
+import { IconAlertTriangle, IconChevronDown, IconClockOff, IconRefresh } from "@tabler/icons-react";
 import { useMemo } from "react";
 import type { EntryDoc, Job } from "../../api/types";
 import { store, useDeviceVersion, useNodes, useServerNow } from "../../live/live";
@@ -36,7 +36,7 @@ function Failures({ job }: { job: Job | undefined }) {
   return (
     <details className={classes.failures} data-testid="read-failures">
       <summary>
-        <IconAlertTriangle size={17} aria-hidden /> {title}
+        <IconAlertTriangle size={17} aria-hidden /> {title} <IconChevronDown size={17} aria-hidden />
       </summary>
       <ul>
         {reasons.map((failure) => (
