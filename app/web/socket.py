@@ -49,10 +49,10 @@ from app.wire.live import Changes
 
 log = logging.getLogger(__name__)
 
-TICK_S: Final = 0.02
+TICK_S: Final = 0.01
 """Window in which changes are collected: the most that a change waits here."""
 HEARTBEAT_S: Final = 0.25
-AXES_S: Final = 0.05
+AXES_S: Final = 0.02
 AXES_AT_LEAST_S: Final = 1.0
 NODES_S: Final = 0.25
 LINK_S: Final = 1.0

@@ -1,0 +1,161 @@
+"""What the page is told, from frames through the real decoder; and what becomes of it in the 3D view."""
+
+from __future__ import annotations
+
+import struct
+
+import pytest
+
+from app.errors import ValueTypeError
+from app.model.address import Address
+from app.model.datatypes import DataType, encode_raw
+from app.scene.hub import BladeState
+from app.service import views
+from app.service.connection import Connection
+from app.service.scene_feed import pose
+from app.wire.nmt import NmtState
+from tests.web.rig import BUS, Feeder, make_bench
+
+PMC = "wtg-07/blade-1/pmc"
+PMM = "wtg-07/blade-1/pmm"
+SECOND_NS = 1_000_000_000
+
+
+@pytest.fixture
+def bench() -> Connection:
+    return make_bench()
+
+
+@pytest.fixture
+def feeder(bench: Connection) -> Feeder:
+    return Feeder(bench)
+
+
+def axis(bench: Connection, later_ns: int = 0) -> views.AxisLine:
+    targets = {target.slug: target for target in bench.targets}
+    return views.axis_lines(bench.turbine, targets, bench.stamper() + later_ns)[0]
+
+
+def feed_angle(feeder: Feeder, raw: int) -> None:
+    feeder.read(11, Address(0x6092, 1), struct.pack("<I", 36_000))
+    feeder.read(11, Address(0x6092, 2), struct.pack("<I", 1))
+    feeder.read(11, Address(0x6064), struct.pack("<i", raw))
+
+
+def test_the_newest_of_two_objects_of_one_quantity_counts(bench: Connection, feeder: Feeder) -> None:
+    feed_angle(feeder, 8000)
+    feeder.read(11, Address(0x5064), struct.pack("<h", 8100))
+    assert axis(bench).position_deg == 81.0
+    feeder.read(11, Address(0x6064), struct.pack("<i", 8200))
+    assert axis(bench).position_deg == 82.0
+
+
+def test_units_are_those_of_the_names(bench: Connection, feeder: Feeder) -> None:
+    feeder.read(11, Address(0x6079), struct.pack("<I", 315_500))
+    assert axis(bench).dc_link_v == 315.5
+    feeder.read(1, Address(0x3063), struct.pack("<H", 320))
+    assert axis(bench).dc_link_v == 320
+
+
+def test_a_position_is_stale_after_a_second_and_after_lost_frames(bench: Connection, feeder: Feeder) -> None:
+    assert axis(bench).stale
+    feed_angle(feeder, 8000)
+    assert not axis(bench).stale
+    assert axis(bench, SECOND_NS + 1).stale
+    bench.buses[BUS].gap(bench.stamper())
+    assert axis(bench).stale
+    assert axis(bench).position_deg == 80.0
+
+
+def test_a_restart_makes_the_position_unknown(bench: Connection, feeder: Feeder) -> None:
+    feed_angle(feeder, 8000)
+    feeder.heartbeat(11, NmtState.BOOT_UP)
+    assert (axis(bench).position_deg, axis(bench).stale) == (None, True)
+
+
+STATES = [
+    (0x0000, "not_ready_to_switch_on"), (0x0240, "switch_on_disabled"), (0x0231, "ready_to_switch_on"),
+    (0x0233, "switched_on"), (0x0637, "operation_enabled"), (0x0217, "quick_stop_active"),
+    (0x021F, "fault_reaction_active"), (0x0218, "fault"), (0x0238, "fault"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("status", "name"), STATES)
+def test_states_of_the_statusword(bench: Connection, feeder: Feeder, status: int, name: str) -> None:
+    feeder.read(11, Address(0x6041), struct.pack("<H", status))
+    assert axis(bench).state == f"axis_state.{name}"
+    assert views.device_state(bench.target(PMC)) == f"axis_state.{name}"
+
+
+def test_faults_come_from_the_error_code_or_from_an_emergency_whichever_is_newer(
+    bench: Connection, feeder: Feeder
+) -> None:
+    assert axis(bench).fault_code is None
+    feeder.read(11, Address(0x603F), bytes(2))
+    assert (axis(bench).fault_code, axis(bench).fault_text_key) == (0, None)
+    feeder.can(0x80 + 11, struct.pack("<HB5x", 0x2310, 1))
+    assert (axis(bench).fault_code, axis(bench).fault_text_key) == (0x2310, "error_code.over_current_output")
+    feeder.read(11, Address(0x603F), bytes(2))
+    assert axis(bench).fault_code == 0
+    feeder.can(0x80 + 1, struct.pack("<HB5x", 0xFFFE, 1))
+    assert (axis(bench).fault_code, axis(bench).fault_text_key) == (0xFFFE, None)
+
+
+def test_a_silent_node_is_in_no_known_state(bench: Connection, feeder: Feeder) -> None:
+    feeder.read(11, Address(0x1017), struct.pack("<H", 100))
+    feeder.heartbeat(11, NmtState.OPERATIONAL)
+    lines = {line.device: line for line in views.node_lines(bench.targets, bench.live)}
+    assert (lines[PMC].nmt, lines[PMC].silent, lines[PMC].heartbeat_period_ms) == ("operational", False, 100)
+    assert (lines[PMM].nmt, lines[PMM].heartbeat_t_ns) == ("unknown", None)
+    bench.live.tick(bench.stamper() + SECOND_NS)
+    silent = next(line for line in views.node_lines(bench.targets, bench.live) if line.device == PMC)
+    assert (silent.nmt, silent.silent) == ("unknown", True)
+
+
+def test_the_twin_badge_needs_every_device_to_say_so(bench: Connection, feeder: Feeder) -> None:
+    nodes = [target.node for target in bench.targets]
+    for node in nodes:
+        assert not views.all_twins(bench.targets)
+        feeder.read(node, Address(0x1008), b"HUBSIDE TWIN PMC")
+    assert views.all_twins(bench.targets)
+    feeder.read(nodes[0], Address(0x1008), b"PMC")
+    assert not views.all_twins(bench.targets)
+
+
+def test_raw_values_survive_json(bench: Connection) -> None:
+    entry = bench.target(PMM).entry(Address(0x3110, 1))
+    text = bench.target(PMM).entry(Address(0x1008))
+    assert views.raw_to_json(2**53 - 1) == 2**53 - 1
+    assert views.raw_to_json(2**64 - 1) == "18446744073709551615"
+    assert views.raw_to_json(b"\x0a\xff") == "0aff"
+    assert views.raw_from_json(entry, "-5") == -5
+    assert views.raw_from_json(text, "12") == "12"
+    with pytest.raises(ValueTypeError):
+        views.raw_from_json(entry, "0aff")
+
+
+def test_an_object_that_nobody_described_shows_its_bytes(bench: Connection, feeder: Feeder) -> None:
+    feeder.read(1, Address(0x2ABC, 3), encode_raw(DataType.UNSIGNED16, 0x1234))
+    target = bench.target(PMM)
+    cells = views.value_cells(target, bench.live.values(BUS, 1).values())
+    assert cells["2ABC:03"].raw == "3412"
+    assert views.value_cells(bench.target(PMC), bench.live.values(BUS, 1).values()) == {}
+
+
+def test_events_name_the_device_by_its_slug(bench: Connection, feeder: Feeder) -> None:
+    feeder.heartbeat(11, NmtState.BOOT_UP)
+    feeder.heartbeat(77, NmtState.BOOT_UP)
+    slugs = {(target.device.bus, target.node): target.slug for target in bench.targets}
+    lines = [views.event_of_wire(event, slugs) for event in bench.live.events()]
+    assert [(line.device, line.details.get("node")) for line in lines] == [(PMC, None), (None, 77)]
+
+
+def test_the_3d_view_shows_what_is_known_and_how_well(bench: Connection, feeder: Feeder) -> None:
+    assert (pose(axis(bench)).angle_deg, pose(axis(bench)).state) == (None, BladeState.UNKNOWN)
+    feed_angle(feeder, 8123)
+    assert (pose(axis(bench)).angle_deg, pose(axis(bench)).state) == (81.23, BladeState.IDLE)
+    assert "81.23°" in pose(axis(bench)).label
+    for status, state in ((0x0237, BladeState.ENABLED), (0x0217, BladeState.WARNING), (0x0218, BladeState.FAULT)):
+        feeder.read(11, Address(0x6041), struct.pack("<H", status))
+        assert pose(axis(bench)).state is state
+    assert pose(axis(bench, 2 * SECOND_NS)).state is BladeState.STALE
