@@ -285,7 +285,9 @@ class _Channel:
                 self.unanswered.flush()
             if end is End.DONE and isinstance(transfer, WriteStep) and transfer.doubtful:
                 self.unanswered.still_owed(transfer)
-        if self.wanted is not None:
+        if self.wanted is not None and not self.sure:
+            self._without_answer()  # the answer may be that of an older fence, which proves nothing
+        elif self.wanted is not None:
             wanted, self.wanted = self.wanted, None
             self._send(wanted)
         elif self.job is not None:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import chain, repeat
 
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from app.drivers.contract import Written
@@ -107,6 +107,15 @@ def tell(delays: list[int], lost: set[int], operations: list[Op]) -> Story:
     return story
 
 
+def plain(object_number: int, writes: bool = False) -> Op:
+    return Op(object_number, writes, refused=False, urgent=False, gap_ms=0)
+
+
+@example(
+    delays=[1, 1300, 2600, 1, 1, 1, 499, 2600],
+    lost=set(),
+    operations=[plain(0), plain(0), plain(1), plain(0), plain(2), plain(0, writes=True)],
+)
 @settings(max_examples=150, deadline=None)
 @given(delays_ms, st.sets(st.integers(1, 40), max_size=5), st.lists(ops, min_size=1, max_size=8))
 def test_what_is_said_of_a_write_is_what_happened(delays: list[int], lost: set[int], operations: list[Op]) -> None:
