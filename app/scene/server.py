@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, Final
 
+import rich
 import viser
 import viser._messages as viser_messages
 import websockets.asyncio.server
@@ -25,6 +26,8 @@ _patching = threading.Lock()
 
 def start_server(secret: str) -> viser.ViserServer:
     """A viser server on 127.0.0.1 and a port of the system's choice; requests without ``secret`` get 403."""
+    # viser prints its own address at every start, which only our proxy may open.
+    rich.get_console().quiet = True
     with _patching, _guarded(secret):
         server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
     for message in (viser_messages.ShareUrlRequest, viser_messages.ShareUrlDisconnect):

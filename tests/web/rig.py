@@ -100,6 +100,7 @@ class Server:
             "additional_headers": {"Cookie": self.cookie},
             "proxy": None,
             "max_size": None,
+            "close_timeout": 1,
             "host": "127.0.0.1",
             "port": self.port,
         }

@@ -47,7 +47,7 @@ async def test_the_view_is_bare_and_holds_all_three_blades() -> None:
 
 
 async def keep_feeding(feeder: Feeder) -> None:
-    """Angles and states again and again, as they would be polled. At 0 degrees the blades are seen at their broadest."""
+    """Angles and states again and again, as if polled. At 0 degrees the blades are seen at their broadest."""
     while True:
         for node, (status, _) in STATES.items():
             feeder.read(node, Address(0x6064), bytes(4))

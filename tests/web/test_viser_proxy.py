@@ -47,6 +47,11 @@ async def test_the_path_without_a_slash_leads_to_it(server: Server) -> None:
     assert (answer.status_code, answer.headers["location"]) == (307, "/viser/?darkMode")
 
 
+def test_the_3d_server_does_not_advertise_itself(capfd: pytest.CaptureFixture[str]) -> None:
+    HubScene("x").close()
+    assert capfd.readouterr().out == ""
+
+
 async def test_nothing_beyond_the_client_can_be_reached(server: Server) -> None:
     for path in ("/viser/nothing.js", "/viser/../api/session", "/viser/%2e%2e/%2e%2e/etc/passwd"):
         answer = await server.client.get(path)
