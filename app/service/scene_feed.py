@@ -11,14 +11,13 @@ from typing import Final, Protocol
 from app.model.site import Turbine
 from app.scene.hub import BladePose, BladeState
 from app.service.devices import Target
-from app.service.views import AxisLine, axis_lines
+from app.service.views import ENABLED, AxisLine, axis_lines
 from app.wire.live import LiveState
 
 log = logging.getLogger(__name__)
 
 PERIOD_S: Final = 1 / 30
 _STOPPED: Final = "axis_state.quick_stop_active"
-_ENABLED: Final = ("axis_state.operation_enabled", _STOPPED)
 _FAULT: Final = ("axis_state.fault", "axis_state.fault_reaction_active")
 
 
@@ -64,7 +63,7 @@ def _look(line: AxisLine) -> BladeState:
         return BladeState.FAULT
     if line.state == _STOPPED:
         return BladeState.WARNING
-    return BladeState.ENABLED if line.state in _ENABLED else BladeState.IDLE
+    return BladeState.ENABLED if line.state == ENABLED else BladeState.IDLE
 
 
 @contextlib.asynccontextmanager

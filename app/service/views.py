@@ -30,6 +30,9 @@ STATUSWORD: Final = Address(0x6041)
 ERROR_CODE: Final = Address(0x603F)
 _POSITION: Final = (Address(0x6064), Address(0x5064))
 _DEMAND: Final = (Address(0x607A), Address(0x507A))
+_MODE: Final = Address(0x6061)
+_POSITION_MODES: Final = (1, 8)
+"""Profile position and cyclic synchronous position (CiA 402, modes of operation)."""
 _VELOCITY: Final = (Address(0x606C), Address(0x506C))
 _DC_LINK: Final = (Address(0x6079), Address(0x5079), Address(0x3063))
 _SOC: Final = (Address(0x3080),)
@@ -56,6 +59,7 @@ _SOURCE: Final[Mapping[Source, SourceName]] = {
     Source.PDO_RX: "pdo",
     Source.EMCY: "emcy",
 }
+ENABLED: Final = "axis_state.operation_enabled"
 _STATES: Final = (
     (0x4F, 0x00, "not_ready_to_switch_on"),
     (0x4F, 0x40, "switch_on_disabled"),
@@ -86,6 +90,7 @@ class NodeLine:
 class AxisLine:
     """One blade. ``state`` and ``fault_text_key`` are text keys; ``fault_code`` 0 is no fault, None not known.
 
+    ``demand_deg`` is None while the axis does not follow a target position.
     ``stale``: the position is not known, older than a second, or its node is silent.
     """
 
@@ -197,15 +202,16 @@ def axis_lines(turbine: Turbine, targets: Mapping[str, Target], now_ns: int) -> 
 
 def _axis_line(station: Station, blade: int, devices: list[Target], now_ns: int) -> AxisLine:
     position = _latest(devices, _POSITION)
+    state = next((axis_state(raw) for raw in _lookups(devices, STATUSWORD) if isinstance(raw, int)), None)
     code, text_key = _fault(devices)
     return AxisLine(
         station=station.slug,
         blade=blade,
         position_deg=_number(position),
         position_t_ns=None if position is None else position.t_ns,
-        demand_deg=_number(_latest(devices, _DEMAND)),
+        demand_deg=_demand(devices, state),
         velocity_dps=_number(_latest(devices, _VELOCITY)),
-        state=next((axis_state(raw) for raw in _lookups(devices, STATUSWORD) if isinstance(raw, int)), None),
+        state=state,
         fault_code=code,
         fault_text_key=text_key,
         battery_soc_pct=_number(_latest(devices, _SOC)),
@@ -213,6 +219,14 @@ def _axis_line(station: Station, blade: int, devices: list[Target], now_ns: int)
         dc_link_v=_number(_latest(devices, _DC_LINK)),
         stale=position is None or position.stale or now_ns - position.t_ns > STALE_NS,
     )
+
+
+def _demand(devices: list[Target], state: str | None) -> float | None:
+    """The target position, while the axis follows it: an old target is no demand on an axis that is off."""
+    mode = next((raw for raw in _lookups(devices, _MODE) if raw is not None), None)
+    if state != ENABLED or (mode is not None and mode not in _POSITION_MODES):
+        return None
+    return _number(_latest(devices, _DEMAND))
 
 
 def axis_state(status: int) -> str | None:

@@ -50,6 +50,17 @@ def test_the_newest_of_two_objects_of_one_quantity_counts(bench: Connection, fee
     assert axis(bench).position_deg == 82.0
 
 
+def test_a_target_is_a_demand_only_while_the_axis_follows_it(bench: Connection, feeder: Feeder) -> None:
+    feed_angle(feeder, 8000)
+    feeder.read(11, Address(0x607A), bytes(4))
+    assert axis(bench).demand_deg is None
+    feeder.read(11, Address(0x6041), struct.pack("<H", 0x0237))
+    feeder.read(11, Address(0x6061), bytes((1,)))
+    assert axis(bench).demand_deg == 0.0
+    feeder.read(11, Address(0x6061), bytes((3,)))
+    assert axis(bench).demand_deg is None
+
+
 def test_units_are_those_of_the_names(bench: Connection, feeder: Feeder) -> None:
     feeder.read(11, Address(0x6079), struct.pack("<I", 315_500))
     assert axis(bench).dc_link_v == 315.5

@@ -283,6 +283,7 @@ export interface components {
          * AxisLine
          * @description One blade. ``state`` and ``fault_text_key`` are text keys; ``fault_code`` 0 is no fault, None not known.
          *
+         *     ``demand_deg`` is None while the axis does not follow a target position.
          *     ``stale``: the position is not known, older than a second, or its node is silent.
          */
         AxisLine: {
