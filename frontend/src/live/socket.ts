@@ -7,7 +7,7 @@ import { Backoff } from "./backoff";
 import { DeafnessTimer } from "./deafness";
 import type { LiveStore } from "./store";
 
-const CHECK_MS = 200;
+const CHECK_MS = 100;
 const GIVE_UP_MS = 3000;
 const BASE_TOPICS = ["link", "nodes", "axes", "events"];
 

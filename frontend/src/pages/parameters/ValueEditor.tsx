@@ -89,8 +89,10 @@ function BitsEditor(props: Props & { table: readonly BitDoc[] }) {
   const { entry, typed, onTyped, table } = props;
   const parsed = parse(doc, entry, typed, lookup);
   const raw = parsed.ok && typeof parsed.raw === "number" ? parsed.raw : null;
-  const set = (bit: BitDoc, value: number) =>
-    onTyped(hexadecimal(entry, withField(entry, raw ?? 0, bit, value)));
+  // Bits without a name must keep their value: with nothing known there is nothing to start from.
+  const set = (bit: BitDoc, value: number) => {
+    if (raw !== null) onTyped(hexadecimal(entry, withField(entry, raw, bit, value)));
+  };
   return (
     <Stack gap="sm">
       <fieldset className={classes.bits} disabled={raw === null}>
@@ -134,6 +136,7 @@ function BitField({ entry, bit, raw, onSet }: BitProps) {
   }
   return (
     <Checkbox
+      className={classes.bit}
       label={label}
       checked={value === 1}
       onChange={(event) => onSet(event.currentTarget.checked ? 1 : 0)}
