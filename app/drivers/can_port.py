@@ -1,6 +1,7 @@
 """One CAN bus of the tool: the receive thread that owns the adapter, and all that may be done from outside.
 
-The thread receives in batches, stamps, and hands each batch to the listeners: ours and received frames in one order,
+The thread receives in batches, stamps (the last frame with now, those before it by their distance on the adapter's
+clock), and hands each batch to the listeners: ours and received frames in one order,
 our own tapped where they are sent. Engines that react on the bus live on this thread (``call_soon``, ``call_at``,
 ``send`` from a listener), so that an answer is followed by the next request without a change of threads. A listener
 that raises is logged and counted, the others are served. When the adapter is lost the thread goes on: timers fire,
@@ -39,6 +40,8 @@ RETRY_S: Final = 0.25
 _OPEN_TIMEOUT_S: Final = 1.0
 _POLL_S: Final = 0.002
 """Longest wait where the adapter cannot be waited for together with our wake-up."""
+_MAX_AGE_NS: Final = 100_000_000
+"""Frames of one batch that lie further apart by the adapter's clock: the clock was set."""
 _LOGGED_ERRORS: Final = 20
 """Exceptions of listeners that are logged in full; after that every thousandth."""
 
@@ -316,11 +319,16 @@ class CanPort:
     def _hand_over(self, received: list[Received]) -> None:
         if not received and not self._tapped:
             return
-        stamper, bus, direction = self._stamper, self.bus, Direction.RX
+        bus, direction = self.bus, Direction.RX
         with self._tx_lock:
             # Under the lock, so that no frame is sent with a time before those of this batch and comes in the next.
             frames, self._tapped = self._tapped, []
-            frames += [Frame(stamper(), bus, direction, can, t_ns) for can, t_ns in received]
+            if received:
+                stamps = self._stamper.take_aged(_ages_ns(received))
+                frames += [
+                    Frame(t_ns, bus, direction, can, adapter_ns)
+                    for t_ns, (can, adapter_ns) in zip(stamps, received, strict=True)
+                ]
         self._received += len(received)
         for listener in self._listeners:
             self._guarded(listener, frames)
@@ -423,6 +431,18 @@ class CanPort:
         if self._wake_tx is not None:
             with suppress(OSError):
                 self._wake_tx.send(b"\0")
+
+
+def _ages_ns(received: list[Received]) -> list[int]:
+    """How long before the last frame of a batch each came, by the adapter's clock; 0 where that does not tell.
+
+    The last one came just now: so frames that were read late, or together, keep the distances they had on the bus.
+    """
+    last_ns = received[-1][1]
+    if last_ns is None or len(received) == 1:
+        return [0] * len(received)
+    ages_ns = [0 if t_ns is None else last_ns - t_ns for _, t_ns in received]
+    return ages_ns if all(0 <= age_ns <= _MAX_AGE_NS for age_ns in ages_ns) else [0] * len(received)
 
 
 def _join(thread: threading.Thread | None, deadline: float) -> None:

@@ -43,6 +43,8 @@ SHORT_LIST: Final = 16
 """A list of more objects is bulk: it waits for everything else."""
 _SLOW: Final = frozenset({0x1010, 0x1011})
 _PROGRESS_S: Final = 0.05
+GATHER_S: Final = 0.002
+"""While nothing of ours runs frames are read this often at most: a full bus then costs half, and views wait longer."""
 _HEARTBEAT_BASE: Final = 0x700
 
 
@@ -75,6 +77,7 @@ class CanOpenDriver:
         self._pending: set[asyncio.Future[Any]] = set()
         self._timeouts_ns: dict[int, dict[Address, int]] = {}
         self._port = CanPort(config.listening(True), bus, stamper, self.watch.on_frames, monotonic_ns=monotonic_ns)
+        self._port.gather_s = GATHER_S
         self._client = SdoClient(self._port, monotonic_ns)
         self._port.add_listener(self._client.on_frames, first=True)
         self._port.add_status_listener(self._on_status)
@@ -306,7 +309,8 @@ class CanOpenDriver:
         loop = asyncio.get_running_loop()
         future: asyncio.Future[T] = loop.create_future()
         self._pending.add(future)
-        future.add_done_callback(self._pending.discard)
+        self._port.gather_s = 0.0
+        future.add_done_callback(self._forget)
 
         def on_done(result: T | None, error: Exception | None) -> None:
             # One turn later, so that every subscriber has seen the frames before the caller has the result.
@@ -322,6 +326,11 @@ class CanOpenDriver:
         except asyncio.CancelledError:
             self._port.call_soon(lambda: self._client.cancel(node, job))
             raise
+
+    def _forget(self, future: asyncio.Future[Any]) -> None:
+        self._pending.discard(future)
+        if not self._pending:
+            self._port.gather_s = GATHER_S
 
     def _require_active(self, node: int | None, asked: bool = True) -> None:
         """Refuse what must not be sent. ``asked`` False skips the question for consent."""

@@ -55,19 +55,21 @@ class BusWatch:
     def on_frames(self, frames: Sequence[Frame]) -> None:
         """Take what was received; a node that is known costs one look-up."""
         kinds = self._kinds
-        for frame in frames:
-            can = frame.payload
-            if frame.direction is not Direction.RX or not isinstance(can, Can) or can.extended or can.error:
+        for t_ns, _, direction, can, _ in frames:
+            if direction is not Direction.RX or type(can) is not Can:
                 continue
-            if can.remote:
-                if can.can_id & 0x780 == _GUARDING_BASE:
-                    self._note(MasterSign.NODE_GUARDING, can.can_id, frame.t_ns)
+            can_id, _, extended, remote, error, _ = can
+            if extended or error:
                 continue
-            if can.can_id not in kinds:
+            if remote:
+                if can_id & 0x780 == _GUARDING_BASE:
+                    self._note(MasterSign.NODE_GUARDING, can_id, t_ns)
+                continue
+            if can_id not in kinds:
                 self._classify(can)
-            sign = kinds[can.can_id]
+            sign = kinds[can_id]
             if sign is not None:
-                self._note(sign, can.can_id, frame.t_ns)
+                self._note(sign, can_id, t_ns)
 
     def _note(self, sign: MasterSign, can_id: int, t_ns: int) -> None:
         before = self._masters.get(can_id)

@@ -18,6 +18,9 @@ class Addressing(Enum):
     OD = "od"
     PKW = "pkw"
 
+    # Enum's own is written in Python, and addresses are looked up with every value that crosses a bus.
+    __hash__ = object.__hash__
+
 
 class Address(NamedTuple):
     """One parameter: ``major`` is the index (or IND), ``minor`` the sub-index (or PNU)."""

@@ -86,13 +86,13 @@ class BusLink:
             self.sink.write(frames)
         with self._lock:
             self.frames += len(frames)
-            for frame in frames:
-                can = frame.payload
-                if isinstance(can, Can):
-                    self.load.feed(frame.t_ns, frame_bits(can), can.can_id, can.extended)
-                records = self.decoder.feed(frame)
-                if records:
-                    self._live.apply_all(records)
+            count = self.load.feed
+            for t_ns, _, _, can, _ in frames:
+                if type(can) is Can:
+                    count(t_ns, frame_bits(can), can.can_id, can.extended)
+            records = self.decoder.feed_all(frames)
+            if records:
+                self._live.apply_all(records)
 
     def gap(self, t_ns: int) -> None:
         """Frames are missing before ``t_ns``: what was read until then proves nothing any more."""

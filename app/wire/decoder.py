@@ -106,8 +106,9 @@ class CanOpenDecoder:
     def feed_all(self, frames: Iterable[Frame]) -> list[Record]:
         """Decode many frames in their order."""
         records: list[Record] = []
+        feed = self.feed
         for frame in frames:
-            records += self.feed(frame)
+            records += feed(frame)
         return records
 
     def gap(self, t_ns: int, reason: str) -> Sequence[Record]:

@@ -6,7 +6,7 @@ buses (see ``Stamper``). Frames are named tuples: cheap enough to make by the te
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from enum import Enum
 from threading import Lock
 from typing import NamedTuple
@@ -92,3 +92,15 @@ class Stamper:
                 now_ns = self._last_ns + STAMP_STEP_NS
             self._last_ns = now_ns
             return now_ns
+
+    def take_aged(self, ages_ns: Sequence[int]) -> list[int]:
+        """Time stamps for what came so long before now each, in this order, each later than any before."""
+        with self._lock:
+            now_ns, last_ns, stamps = self._monotonic_ns() + self._offset_ns, self._last_ns, []
+            for age_ns in ages_ns:
+                t_ns = now_ns - age_ns
+                t_ns -= t_ns % STAMP_STEP_NS
+                last_ns = t_ns if t_ns > last_ns else last_ns + STAMP_STEP_NS
+                stamps.append(last_ns)
+            self._last_ns = last_ns
+            return stamps

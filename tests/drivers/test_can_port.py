@@ -21,11 +21,12 @@ from app.drivers.can_config import CanConfig, CanInterface, parse_can
 from app.drivers.can_port import CanPort, PortState, PortStatus, Timer
 from app.drivers.slcan import format_line, parse_line
 from app.drivers.socketcan import SocketcanLink
+from app.drivers.socketcand import Received
 from app.errors import BusLostError, BusOpenError, RefusedError
 from app.twins.line import CanLine
 from app.twins.line_thread import LineThread
 from app.twins.socketcand_server import SocketcandServer
-from app.wire.frame import Can, Direction, Frame, Stamper
+from app.wire.frame import STAMP_STEP_NS, Can, Direction, Frame, Stamper
 
 
 class Witness:
@@ -220,6 +221,32 @@ def test_gathering_makes_fewer_batches_and_delays_no_call(bench: Bench) -> None:
     called = threading.Event()
     bench.port.call_soon(called.set)
     assert called.wait(5)
+
+
+def test_frames_that_were_gathered_keep_the_distances_they_had_on_the_bus(bench: Bench) -> None:
+    bench.send(Can(0x180))
+    bench.witness.wait_for(lambda: len(bench.witness.frames) == 1)
+    bench.port.gather_s = 0.05
+    bench.send(Can(0x181))  # the wait begins behind it
+    bench.witness.wait_for(lambda: len(bench.witness.frames) == 2)
+    bench.send(*(Can(0x182, bytes([number])) for number in range(100)))
+    bench.witness.wait_for(lambda: len(bench.witness.frames) == 102)
+    gathered = bench.witness.frames[2:]
+    pairs = [
+        (later.t_ns - frame.t_ns, later.t_adapter_ns - frame.t_adapter_ns)
+        for frame, later in itertools.pairwise(gathered)
+        if later.t_adapter_ns is not None and frame.t_adapter_ns is not None
+    ]
+    alike = sum(1 for ours_ns, adapter_ns in pairs if abs(ours_ns - adapter_ns) <= 2000)
+    assert alike >= 0.9 * len(gathered)  # all but those at the seams of batches
+
+
+def test_an_adapter_whose_clock_was_set_does_not_tell_distances(bench: Bench) -> None:
+    received: list[Received] = [(Can(1), 9_000_000_000), (Can(2), 1_000_000_000), (Can(3), 1_000_100_000)]
+    bench.port.call_soon(lambda: bench.port._hand_over(received))
+    bench.witness.wait_for(lambda: len(bench.witness.frames) == 3)
+    first, second, third = (frame.t_ns for frame in bench.witness.frames)
+    assert second - first == third - second == STAMP_STEP_NS
 
 
 def test_a_cut_connection_comes_back_and_the_gap_is_told(bench: Bench) -> None:

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from app.drivers.can_config import CanConfig, CanInterface
-from app.drivers.canopen import CanOpenDriver
+from app.drivers.canopen import GATHER_S, CanOpenDriver
 from app.drivers.contract import Driver, LinkState, MasterSign, Written
 from app.drivers.table import driver_class
 from app.errors import BusLostError, BusOpenError, ConsentError, NoAnswerError, RefusedError, SdoAbortError, UsageError
@@ -93,6 +93,17 @@ async def test_it_is_ready_once_connect_returns(line: Wire) -> None:
     for _ in range(20):
         async with driver_on(line, listen_s=0.0) as driver:
             assert driver.status.state is LinkState.CONNECTED
+
+
+async def test_frames_gather_only_while_nothing_of_ours_runs(line: Wire) -> None:
+    async with driver_on(line) as driver:
+        assert driver.port.gather_s == GATHER_S
+        during: list[float] = []
+        driver.subscribe(lambda _frames: during.append(driver.port.gather_s))
+        await driver.read(11, WINDOW)
+        assert during
+        assert during[-1] == 0.0
+        await comes_true(lambda: driver.port.gather_s == GATHER_S)
 
 
 async def test_nothing_is_sent_while_listening(line: Wire) -> None:
