@@ -13,6 +13,7 @@
     │   ├── ValueTypeError                  the value does not fit the data type
     │   ├── LimitError                      the value is out of range; names the limit
     │   ├── PreconditionError               another object or state forbids it
+    │   ├── MotionError                     the write could set an axis in motion
     │   └── ConsentError                    active access needs consent (other master seen)
     ├── DeviceError                exit 4   the device answered and refused
     │   ├── SdoAbortError                   CiA 301 abort code
@@ -112,6 +113,12 @@ class PreconditionError(RefusedError):
     """Another object or the device's state forbids it. Details: address, name, needs, found."""
 
     code = "precondition"
+
+
+class MotionError(RefusedError):
+    """The write could set an axis in motion, and nobody has taken charge of that. Details: address, name."""
+
+    code = "motion"
 
 
 class ConsentError(RefusedError):

@@ -33,7 +33,7 @@ class Settings:
 
 
 def settings_from(environment: Mapping[str, str], data: Path | None = None) -> Settings:
-    """Settings of this run; ``data`` from the command line goes before ``HUBSIDE_DATA`` and the system's usual place."""
+    """Settings of this run; ``data`` of the command line goes before ``HUBSIDE_DATA`` and the system's usual place."""
     folder = data or (Path(environment["HUBSIDE_DATA"]) if environment.get("HUBSIDE_DATA") else _usual(environment))
     language = environment.get("HUBSIDE_LANGUAGE") or environment.get("LANG", "en")[:2].lower()
     return Settings(

@@ -6,8 +6,6 @@ import shutil
 import subprocess
 from pathlib import Path
 
-import pytest
-
 from app.web import generate
 
 FRONTEND = Path(__file__).resolve().parent.parent / "frontend"

@@ -18,7 +18,7 @@ from app.cli.targets import add_connection, bare_turbine, descriptions_for, find
 from app.drivers.contract import FoundNode
 from app.errors import HubsideError, NoAnswerError, SdoAbortError, UsageError
 from app.model.address import parse_address
-from app.model.checks import check_read
+from app.model.checks import Allow, check_read
 from app.model.datatypes import Raw
 from app.model.description import Entry
 from app.model.site import Turbine
@@ -53,6 +53,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     write.add_argument("address")
     write.add_argument("value", help="49.5, '49,5 °C', 0x1F, raw:495 or the name of an enumeration")
     write.add_argument("--factory", action="store_true", help="allow r(w) objects")
+    write.add_argument("--motion", action="store_true", help="allow objects that can set an axis in motion (6040h)")
     write.add_argument("--save", action="store_true", help="then save to non-volatile memory")
     saving = command("save", _save, "save the parameters of a device to its non-volatile memory")
     saving.add_argument("target", help="TURBINE/STATION/DEVICE or a node number")
@@ -239,8 +240,15 @@ async def _write(arguments: argparse.Namespace, output: Output) -> int:
         target = _target(connection, arguments.target)
         entry = target.entry(address)
         driver = connection.driver(target)
+        allow = Allow.FACTORY if arguments.factory else Allow.NOTHING
+        allow |= Allow.MOTION if arguments.motion else Allow.NOTHING
         result = await write_text(
-            driver, target, address, arguments.value, connection.journal, factory=arguments.factory
+            driver,
+            target,
+            address,
+            arguments.value,
+            connection.journal,
+            allow=allow,
         )
         was = "–" if result.was is None else show(entry, result.was, target.lookup)
         now = show(entry, result.sent if result.read is None else result.read, target.lookup)

@@ -3,11 +3,22 @@
 from __future__ import annotations
 
 from decimal import Decimal
+from enum import Flag, auto
 
-from app.errors import AccessError, LimitError, PreconditionError, ValueTypeError
+from app.errors import AccessError, LimitError, MotionError, PreconditionError, ValueTypeError
 from app.model.datatypes import Raw, encode_raw
 from app.model.description import Access, Description, Entry, Limit, LimitRef, Lookup
 from app.model.values import quantity_of, show
+
+
+class Allow(Flag):
+    """What a write may do beyond ordinary parameters."""
+
+    NOTHING = 0
+    FACTORY = auto()
+    """Write r(w) objects, which only the maker sets."""
+    MOTION = auto()
+    """Write objects that can set an axis in motion."""
 
 
 def check_read(entry: Entry) -> None:
@@ -22,16 +33,19 @@ def check_write(
     raw: Raw,
     lookup: Lookup,
     *,
-    factory: bool = False,
+    allow: Allow = Allow.NOTHING,
     variant: str | None = None,
 ) -> bytes:
     """Check everything that can be known before a write; gives the bytes to send.
 
     ``lookup`` knows other objects of the device; a limit that rests on an unknown object is left to the device.
-    ``factory`` allows r(w) objects. Raises AccessError, ValueTypeError, LimitError or PreconditionError.
+    ``allow`` says what is permitted beyond ordinary parameters. Raises AccessError, MotionError, ValueTypeError,
+    LimitError or PreconditionError.
     """
-    if not (entry.access.writable or (factory and entry.access is Access.FACTORY)):
+    if not (entry.access.writable or (Allow.FACTORY in allow and entry.access is Access.FACTORY)):
         raise AccessError(address=entry.address.short, name=entry.title, access=entry.access.value)
+    if entry.motion and Allow.MOTION not in allow:
+        raise MotionError(address=entry.address.short, name=entry.title)
     data = _encode(entry, raw)
     if isinstance(raw, int | float):
         _check_limits(entry, raw, lookup, variant)

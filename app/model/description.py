@@ -193,7 +193,8 @@ class Entry:
     """One row of a dictionary: one sub-index, or one PNU.
 
     ``default``, ``minimum`` and ``maximum`` are raw values; where ``node_id``, the node's number is added to the
-    default ($NODEID of CiA 306). ``inferred`` marks what the manual does not print.
+    default ($NODEID of CiA 306). ``inferred`` marks what the manual does not print;
+    ``motion`` an object whose write can set an axis in motion.
     ``line`` is the row's line in its file.
     """
 
@@ -225,6 +226,7 @@ class Entry:
     timeout_s: float | None = None
     hexadecimal: bool = False
     node_id: bool = False
+    motion: bool = False
     line: int = 0
 
     @property

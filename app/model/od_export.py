@@ -168,6 +168,7 @@ def entry_dict(entry: Entry) -> dict[str, Any]:
         "by_variant": {name: _variant(values) for name, values in entry.variants.items()},
         "note": entry.note,
         "inferred": entry.inferred,
+        "motion": entry.motion,
         "timeout_s": entry.timeout_s,
         "hexadecimal": entry.hexadecimal,
     }

@@ -86,7 +86,13 @@ class Journal:
         """Have ``listener`` called with every new event; the returned function ends that."""
         with self._lock:
             self._listeners.append(listener)
-        return lambda: self._listeners.remove(listener)
+
+        def end() -> None:
+            with self._lock:
+                if listener in self._listeners:
+                    self._listeners.remove(listener)
+
+        return end
 
     def latest(self) -> list[Entry]:
         """The events kept, oldest first."""

@@ -5,47 +5,18 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
-from collections.abc import AsyncIterator, Callable, Iterable, Mapping
-from typing import Final, Protocol
+from collections.abc import AsyncIterator
+from typing import Final
 
-from app.model.site import Turbine
-from app.scene.hub import BladePose, BladeState
-from app.service.devices import Target
+from app.scene.hub import BladePose, BladeState, HubScene
+from app.service.connection import Connection
 from app.service.views import ENABLED, AxisLine, axis_lines
-from app.wire.live import LiveState
 
 log = logging.getLogger(__name__)
 
 PERIOD_S: Final = 1 / 30
 _STOPPED: Final = "axis_state.quick_stop_active"
 _FAULT: Final = ("axis_state.fault", "axis_state.fault_reaction_active")
-
-
-class Shown(Protocol):
-    """What is needed of the connected turbine."""
-
-    @property
-    def turbine(self) -> Turbine:
-        """Its stations."""
-
-    @property
-    def live(self) -> LiveState:
-        """What is known from the wire."""
-
-    @property
-    def targets(self) -> Iterable[Target]:
-        """Its devices."""
-
-    @property
-    def stamper(self) -> Callable[[], int]:
-        """Gives the time in ns."""
-
-
-class Scene(Protocol):
-    """What shows the poses; ``show`` may be called from any thread."""
-
-    def show(self, poses: Mapping[int, BladePose]) -> None:
-        """Show the blades by their number."""
 
 
 def pose(line: AxisLine) -> BladePose:
@@ -67,7 +38,7 @@ def _look(line: AxisLine) -> BladeState:
 
 
 @contextlib.asynccontextmanager
-async def run_scene(shown: Shown | None, scene: Scene | None) -> AsyncIterator[None]:
+async def run_scene(shown: Connection | None, scene: HubScene | None) -> AsyncIterator[None]:
     """While the block runs, ``scene`` follows ``shown``; nothing where either is None."""
     if shown is None or scene is None:
         yield
@@ -80,7 +51,7 @@ async def run_scene(shown: Shown | None, scene: Scene | None) -> AsyncIterator[N
         await asyncio.gather(task, return_exceptions=True)
 
 
-async def follow(shown: Shown, scene: Scene) -> None:
+async def follow(shown: Connection, scene: HubScene) -> None:
     """Show the axes for ever, thirty times a second, and only what changed. Ends by being cancelled."""
     targets = {target.slug: target for target in shown.targets}
     before: dict[int, BladePose] = {}

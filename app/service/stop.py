@@ -93,7 +93,7 @@ async def _command(axis: Axis, command: Command, now_ns: Callable[[], int]) -> A
 
 async def _confirmed(driver: Driver, target: Target, command: Command) -> bool:
     """The statusword says that the axis obeys: it has left operation enabled (STOP), or drives there (FEATHER)."""
-    raw = decode(target.entry(STATUSWORD), await driver.read(target.node, STATUSWORD))
+    raw = decode(target.entry(STATUSWORD), await driver.read(target.node, STATUSWORD, urgent=True))
     if not isinstance(raw, int):
         return False
     enabled = raw & 0x6F == 0x27  # operation enabled (CiA 402, table 29)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from app.drivers.contract import Driver, Written
 from app.errors import DeviceError, HubsideError, NoAnswerError, UnverifiedError
 from app.model.address import Address
-from app.model.checks import check_write
+from app.model.checks import Allow, check_write
 from app.model.datatypes import Raw
 from app.model.description import Entry, Verify
 from app.model.values import depends_on, parse, show
@@ -28,17 +28,29 @@ class WriteResult:
 
 
 async def write_text(
-    driver: Driver, target: Target, address: Address, text: str, journal: Journal, *, factory: bool = False
+    driver: Driver,
+    target: Target,
+    address: Address,
+    text: str,
+    journal: Journal,
+    *,
+    allow: Allow = Allow.NOTHING,
 ) -> WriteResult:
     """As ``write_raw``, for what a person typed (see ``app.model.values.parse``)."""
     entry = target.entry(address)
     await _know_what_it_rests_on(driver, target, entry)
     raw = parse(target.description, entry, text, target.lookup)
-    return await write_raw(driver, target, address, raw, journal, factory=factory)
+    return await write_raw(driver, target, address, raw, journal, allow=allow)
 
 
 async def write_raw(
-    driver: Driver, target: Target, address: Address, raw: Raw, journal: Journal, *, factory: bool = False
+    driver: Driver,
+    target: Target,
+    address: Address,
+    raw: Raw,
+    journal: Journal,
+    *,
+    allow: Allow = Allow.NOTHING,
 ) -> WriteResult:
     """Check, write once, read back.
 
@@ -47,7 +59,7 @@ async def write_raw(
     """
     entry = target.entry(address)
     await _know_what_it_rests_on(driver, target, entry)
-    data = check_write(target.description, entry, raw, target.lookup, factory=factory)
+    data = check_write(target.description, entry, raw, target.lookup, allow=allow)
     was = decode(entry, await driver.read(target.node, address, entry.timeout_s)) if entry.access.readable else None
     shown = {"address": address.short, "name": entry.title, "was": _shown(target, entry, was)}
     try:

@@ -27,8 +27,9 @@ class PowerConstants:
     """Slow swing of a turbine's auxiliary supply (estimate)."""
     capacity_f: float = 0.003
     """DC link capacitor of a 9 kW drive (typical, 330 uF per kW)."""
-    rectifier_s: float = 0.05
-    """Time constant of charging the DC link from the mains (estimate)."""
+    rectifier_s: float = 0.005
+    """Time constant of charging the DC link from the mains: the capacitor over about 1.7 ohm of line and rectifier, so
+    that a healthy mains holds the link within some 20 V while all of the motor's power is drawn (estimate)."""
     idle_load_w: float = 60.0
     """Electronics and 24 V adapters (estimate)."""
     chopper_ohm: float = 100.0

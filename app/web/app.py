@@ -12,11 +12,11 @@ from fastapi import FastAPI, Request, Response, WebSocket
 from app import __version__
 from app.model.texts import load_texts
 from app.scene.hub import HubScene
+from app.service.connection import Connection
 from app.service.jobs import Jobs
 from app.service.scene_feed import run_scene
 from app.web import problem
 from app.web.access import Access
-from app.web.bench import Bench
 from app.web.guard import Guard
 from app.web.problem import NotFoundError
 from app.web.routes import router
@@ -26,7 +26,7 @@ from app.web.viser_proxy import viser_router
 
 
 def create_app(
-    bench: Bench,
+    bench: Connection,
     access: Access,
     port: int,
     scene: HubScene | None = None,
@@ -54,7 +54,7 @@ def create_app(
     return Guard(app, access, port, load_texts(language)("error.unauthorised"))
 
 
-def create_api(bench: Bench | None, scene: HubScene | None = None, language: str = "en") -> FastAPI:
+def create_api(bench: Connection | None, scene: HubScene | None = None, language: str = "en") -> FastAPI:
     """The HTTP API alone; ``bench`` None serves only to write down the API's types."""
 
     @asynccontextmanager

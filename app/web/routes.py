@@ -12,13 +12,13 @@ from app.model.address import parse_address
 from app.model.od_export import description_dict
 from app.model.texts import LANGUAGES, load_texts
 from app.service.backup import read_device, readable
+from app.service.connection import Connection
 from app.service.devices import Target
 from app.service.jobs import Job, Jobs
 from app.service.save import restart, save
 from app.service.stop import AxisOutcome, Command, command_all
 from app.service.views import device_state, raw_from_json, raw_to_json
 from app.service.write import write_raw
-from app.web.bench import Bench
 from app.web.models import (
     AxisDone,
     BusRef,
@@ -47,9 +47,9 @@ ANY_PROBLEM: dict[int | str, dict[str, Any]] = {
 router = APIRouter(prefix="/api", responses=ANY_PROBLEM)
 
 
-def get_bench(request: Request) -> Bench:
+def get_bench(request: Request) -> Connection:
     """The bench that this server serves."""
-    bench: Bench = request.app.state.bench
+    bench: Connection = request.app.state.bench
     return bench
 
 
@@ -69,7 +69,7 @@ def get_target(request: Request, turbine: str, station: str, device: str) -> Tar
     return target
 
 
-BenchOf = Annotated[Bench, Depends(get_bench)]
+BenchOf = Annotated[Connection, Depends(get_bench)]
 JobsOf = Annotated[Jobs, Depends(get_jobs)]
 TargetOf = Annotated[Target, Depends(get_target)]
 DEVICE = "/live/devices/{turbine}/{station}/{device}"

@@ -17,6 +17,7 @@ from fastapi import WebSocket, WebSocketDisconnect
 from pydantic import TypeAdapter, ValidationError
 
 from app import __version__
+from app.service.connection import Connection
 from app.service.devices import Target
 from app.service.journal import Entry
 from app.service.link import LinkLine, link_line, link_urgent
@@ -31,7 +32,6 @@ from app.service.views import (
     nodes_urgent,
     value_cells,
 )
-from app.web.bench import Bench
 from app.web.models import (
     AxesMessage,
     ClientMessage,
@@ -68,7 +68,7 @@ _adapter: Final[TypeAdapter[Any]] = TypeAdapter(ServerMessage)
 class Feed:
     """What one client is to be told. ``due`` gives the messages of this moment; for one thread."""
 
-    def __init__(self, bench: Bench) -> None:
+    def __init__(self, bench: Connection) -> None:
         self._bench = bench
         self._targets: Mapping[str, Target] = {target.slug: target for target in bench.targets}
         self._slugs = {(target.device.bus, target.node): slug for slug, target in self._targets.items()}
@@ -201,13 +201,13 @@ class Feed:
         return self._seq
 
 
-def link_of(bench: Bench, now_ns: int) -> LinkLine:
+def link_of(bench: Connection, now_ns: int) -> LinkLine:
     """The state of the link now."""
     recording = None if bench.recording is None else bench.recording.status()
     return link_line(bench.buses, recording, all_twins(bench.targets), now_ns)
 
 
-async def serve_client(socket: WebSocket, bench: Bench, now_s: Callable[[], float]) -> None:
+async def serve_client(socket: WebSocket, bench: Connection, now_s: Callable[[], float]) -> None:
     """Serve one page until it goes away. The guard has let it in."""
     await socket.accept()
     feed = Feed(bench)

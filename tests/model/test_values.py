@@ -9,11 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.errors import AccessError, LimitError, PreconditionError, UsageError, ValueTypeError
+from app.errors import AccessError, LimitError, MotionError, PreconditionError, UsageError, ValueTypeError
 from app.model.address import Address, Addressing, parse_address
-from app.model.checks import check_write, limits_of
+from app.model.checks import Allow, check_write, limits_of
 from app.model.datatypes import DataType, Raw, decode_raw, encode_raw
 from app.model.description import Description, Lookup
+from app.model.description_file import load_builtin
 from app.model.values import Scaled, parse, show, to_scaled
 
 WARNING, ERROR = Address(0x2000, 1), Address(0x2000, 2)
@@ -95,7 +96,15 @@ def test_a_write_is_checked_before_it_is_sent(toy: Description) -> None:
 def test_factory_objects_need_the_factory(toy: Description) -> None:
     with pytest.raises(AccessError):
         check_write(toy, toy.entry(FEED), 2, knows())
-    assert check_write(toy, toy.entry(FEED), 2, knows(), factory=True) == b"\2\0\0\0"
+    assert check_write(toy, toy.entry(FEED), 2, knows(), allow=Allow.FACTORY) == b"\2\0\0\0"
+
+
+def test_what_can_move_an_axis_is_no_ordinary_parameter() -> None:
+    pmc = load_builtin("oat-pmc")
+    controlword = pmc.entry(Address(0x6040))
+    with pytest.raises(MotionError):
+        check_write(pmc, controlword, 0x010F, knows())
+    assert check_write(pmc, controlword, 0x010F, knows(), allow=Allow.MOTION) == b"\x0f\x01"
 
 
 def test_preconditions(toy: Description) -> None:

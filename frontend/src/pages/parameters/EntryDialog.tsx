@@ -87,7 +87,7 @@ function Places({ entry }: { entry: EntryDoc }) {
       {entry.note !== null && (
         <div>
           <dt>{t("page.entry.note")}</dt>
-          <dd>{t(`note.${context.doc.id}.${entry.note}`)}</dd>
+          <dd>{t(entry.note)}</dd>
         </div>
       )}
     </dl>
