@@ -324,7 +324,8 @@ class CanPort:
             # Under the lock, so that no frame is sent with a time before those of this batch and comes in the next.
             frames, self._tapped = self._tapped, []
             if received:
-                stamps = self._stamper.take_aged(_ages_ns(received))
+                alone = len(received) == 1
+                stamps = (self._stamper(),) if alone else self._stamper.take_aged(_ages_ns(received))
                 frames += [
                     Frame(t_ns, bus, direction, can, adapter_ns)
                     for t_ns, (can, adapter_ns) in zip(stamps, received, strict=True)
@@ -439,7 +440,7 @@ def _ages_ns(received: list[Received]) -> list[int]:
     The last one came just now: so frames that were read late, or together, keep the distances they had on the bus.
     """
     last_ns = received[-1][1]
-    if last_ns is None or len(received) == 1:
+    if last_ns is None:
         return [0] * len(received)
     ages_ns = [0 if t_ns is None else last_ns - t_ns for _, t_ns in received]
     return ages_ns if all(0 <= age_ns <= _MAX_AGE_NS for age_ns in ages_ns) else [0] * len(received)
