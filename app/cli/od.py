@@ -119,7 +119,7 @@ def _detail(description: Description, entry: Entry, output: Output) -> None:
         "type": entry.type.name,
         "access": entry.access.value,
         "PDO mapping": "yes" if entry.pdo else "no",
-        "default": f"{_default(description, entry)} {entry.quantity.unit}".strip(),
+        "default": f"{_default(description, entry)} {entry.quantity.unit}".strip() if entry.default is not None else "",
         "raw default": "" if entry.default is None else str(entry.default),
         "scale": f"{entry.quantity.scale} {entry.quantity.unit}".strip(),
         "limits (raw)": f"{low} … {high}" if low is not None or high is not None else "",

@@ -94,6 +94,8 @@ def _encode(entry: Entry, raw: Raw) -> bytes:
 
 
 def _check_limits(entry: Entry, raw: int | float, lookup: Lookup, variant: str | None) -> None:
+    if raw in entry.also:
+        return
     low, high = limits_of(entry, lookup, variant)
     number = Decimal(str(raw))
     if (low is not None and number < low) or (high is not None and number > high):

@@ -192,10 +192,9 @@ class VariantValues:
 class Entry:
     """One row of a dictionary: one sub-index, or one PNU.
 
-    ``default``, ``minimum`` and ``maximum`` are raw values; where ``node_id``, the node's number is added to the
-    default ($NODEID of CiA 306). ``inferred`` marks what the manual does not print;
-    ``motion`` an object whose write can set an axis in motion.
-    ``line`` is the row's line in its file.
+    ``default``, ``minimum``, ``maximum`` and ``also`` (values allowed beyond the limits) are raw values. Where
+    ``node_id``, the node's number is added to the default ($NODEID of CiA 306). ``inferred`` marks what the manual does
+    not print; ``motion`` an object whose write can set an axis in motion. ``line`` is the row's line in its file.
     """
 
     address: Address
@@ -213,6 +212,7 @@ class Entry:
     quantity_rule: QuantityRule | None = None
     minimum: Limit | None = None
     maximum: Limit | None = None
+    also: tuple[int, ...] = ()
     enumeration: str | None = None
     bits: str | None = None
     restore: RestoreClass = RestoreClass.NEVER

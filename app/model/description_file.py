@@ -57,7 +57,7 @@ _TOP_KEYS: Final = frozenset(
 _OWN_KEYS: Final = frozenset(("index", "ind", "pnu", "kind", "subs", "elements"))
 _ROW_KEYS: Final = frozenset(
     "name section group type access pdo default saved save_category unit scale hex unit_from min max enumeration bits "
-    "restore verify requires mirror by_variant note inferred timeout_s node_id motion".split()
+    "restore verify requires mirror by_variant note inferred timeout_s node_id motion also".split()
 )
 _NOT_INHERITED_BY_SUB0: Final = _ROW_KEYS - {"section", "group", "saved", "save_category", "inferred"}
 _E = TypeVar("_E", bound=Enum)
@@ -250,6 +250,7 @@ class _Reader:
             quantity_rule=_quantity_rule(row.get("unit_from")),
             minimum=_limit(row.get("min")),
             maximum=_limit(row.get("max")),
+            also=tuple(row.get("also", ())),
             enumeration=row.get("enumeration"),
             bits=row.get("bits"),
             restore=_enum(RestoreClass, row.get("restore", "never"), "restore"),
@@ -294,7 +295,7 @@ def _contradictions(description: Description, entry: Entry) -> Iterator[str]:
     if entry.access is not Access.RW and entry.access is not Access.WO and entry.restore in (RestoreClass.COPY,):
         yield f"restore class '{entry.restore.value}' on an object that cannot be written ({entry.access.value})"
     low, high = entry.minimum, entry.maximum
-    if isinstance(entry.default, int) and not entry.inferred:
+    if isinstance(entry.default, int) and not entry.inferred and entry.default not in entry.also:
         if isinstance(low, int) and entry.default < low:
             yield f"default {entry.default} is below the minimum {low}"
         if isinstance(high, int) and entry.default > high:

@@ -223,14 +223,14 @@ def _entry(section: str, name: str, entry: Entry) -> Iterator[str]:
 
 
 def _limits(entry: Entry) -> Iterator[str]:
-    """Limits that are plain integers, unless the default lies outside: readers refuse such an object."""
-    default = entry.default
+    """Limits that are plain integers, unless an allowed value lies outside: readers refuse such an object."""
+    allowed = [raw for raw in (entry.default, *entry.also) if isinstance(raw, int)]
     for key, limit in (("LowLimit", entry.minimum), ("HighLimit", entry.maximum)):
         if not isinstance(limit, int) or not entry.type.is_integer:
             continue
-        outside = isinstance(default, int) and (default < limit if key == "LowLimit" else default > limit)
+        outside = [raw for raw in allowed if (raw < limit if key == "LowLimit" else raw > limit)]
         if outside:
-            yield f"; {key} {limit} is left out: the default lies outside"
+            yield f"; {key} {limit} is left out: {outside[0]} is allowed"
         else:
             yield f"{key}={limit}"
 

@@ -159,6 +159,7 @@ def entry_dict(entry: Entry) -> dict[str, Any]:
         "unit_from": _quantity_rule(entry.quantity_rule),
         "minimum": _limit(entry.minimum),
         "maximum": _limit(entry.maximum),
+        "also": list(entry.also),
         "enumeration": entry.enumeration,
         "bits": entry.bits,
         "restore": entry.restore.value,

@@ -183,7 +183,7 @@ class ObjectStore:
     def _check_range(self, entry: Entry, raw: Raw) -> None:
         if not isinstance(raw, int | float):
             return
-        if entry.minimum is not None or entry.maximum is not None:
+        if raw not in entry.also and (entry.minimum is not None or entry.maximum is not None):
             low, high = limits_of(entry, self._lookup)
             if high is not None and raw > high:
                 raise RefusedAccessError(Abort.VALUE_TOO_HIGH)

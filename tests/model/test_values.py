@@ -115,6 +115,16 @@ def test_preconditions(toy: Description) -> None:
     assert caught.value.details["needs"] == "2002 = 1"
 
 
+def test_a_single_value_beyond_the_limits() -> None:
+    """The cycle of the battery test: 0 switches it off, else it is an hour at least."""
+    pmm = load_builtin("oat-pmm")
+    cycle = pmm.entry(Address(0x30E3))
+    assert check_write(pmm, cycle, 0, knows()) == b"\0\0"
+    assert check_write(pmm, cycle, 60, knows()) == b"\x3c\0"
+    with pytest.raises(LimitError):
+        check_write(pmm, cycle, 59, knows())
+
+
 def test_variants_have_their_own_limits(toy: Description) -> None:
     entry = toy.entry(ERROR)
     assert limits_of(entry, knows()) == (Decimal(-400), Decimal(900))

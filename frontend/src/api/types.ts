@@ -71,6 +71,8 @@ export interface EntryDoc extends QuantityDoc {
   unit_from: { address: string; shaft: string | null; choices: Record<string, QuantityDoc> } | null;
   minimum: LimitDoc | null;
   maximum: LimitDoc | null;
+  /** Values allowed beyond the limits. */
+  also: number[];
   enumeration: string | null;
   bits: string | null;
   restore: "copy" | "unit" | "factory" | "never";
@@ -78,6 +80,8 @@ export interface EntryDoc extends QuantityDoc {
   requires: { address: string; values: number[] }[];
   note: string | null;
   inferred: boolean;
+  /** A write can set an axis in motion. */
+  motion: boolean;
   hexadecimal: boolean;
 }
 

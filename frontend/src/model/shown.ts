@@ -46,5 +46,6 @@ export function limitText(entry: EntryDoc, context: DeviceContext, all: boolean)
   if (limits.low === null && limits.high === null) return "";
   const side = (raw: number | null) =>
     raw === null ? "–" : show(entry, raw, context.lookup, context.t.language);
-  return `${side(limits.low)} … ${side(limits.high)}`;
+  const also = entry.also.map((raw) => `, ${side(raw)}`).join("");
+  return `${side(limits.low)} … ${side(limits.high)}${also}`;
 }

@@ -33,6 +33,8 @@ const PLAIN: EntryDoc = {
   requires: [],
   note: null,
   inferred: false,
+  motion: false,
+  also: [],
   hexadecimal: false,
   pdo: false,
 };
@@ -172,6 +174,7 @@ describe("what rests on other objects", () => {
 
   it("takes limits of other objects where they are known, else those of the type", () => {
     const entry = of({ maximum: { address: "3110:02", factor: 1 } });
+    expect(parse(DOC, of({ minimum: 60, also: [0], scale: 1 }), "0", nothing)).toEqual({ ok: true, raw: 0 });
     expect(limitsOf(entry, nothing)).toEqual({ low: 100, high: 32767 });
     expect(limitsOf(entry, known({ "3110:02": 600 }))).toEqual({ low: 100, high: 600 });
     expect(raw(entry, "60.1", known({ "3110:02": 600 }))).toEqual({ ok: false, why: Misfit.AboveLimit });

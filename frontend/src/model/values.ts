@@ -162,7 +162,9 @@ export function parse(doc: DescriptionDoc, entry: EntryDoc, typed: string, looku
 
 /** Checks a raw number against limits and an exclusive enumeration. */
 function checkNumber(doc: DescriptionDoc, entry: EntryDoc, raw: Raw, lookup: Lookup): Parsed {
-  const { low, high } = limitsOf(entry, lookup);
+  const { low, high } = entry.also.includes(Number(raw))
+    ? { low: null, high: null }
+    : limitsOf(entry, lookup);
   if (low !== null && Number(raw) < low) return misfit(Misfit.BelowLimit);
   if (high !== null && Number(raw) > high) return misfit(Misfit.AboveLimit);
   const table = entry.enumeration === null ? undefined : doc.enumerations[entry.enumeration];
