@@ -11,8 +11,9 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Coroutine, Iterator
 from pathlib import Path
+from typing import Any
 
 from app.cli.bus import SWITCH_INTERVAL_S, connected
 from app.cli.output import Output
@@ -41,9 +42,9 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         parser.add_argument("--port", type=int, default=DEFAULT_PORT, help="loopback port of the page; 0: any free one")
 
 
-def _start(command: object) -> int:
+def _start(command: Coroutine[Any, Any, int]) -> int:
     sys.setswitchinterval(SWITCH_INTERVAL_S)
-    return asyncio.run(command)  # type: ignore[arg-type]
+    return asyncio.run(command)
 
 
 def _demo(arguments: argparse.Namespace, output: Output) -> int:
@@ -110,7 +111,9 @@ async def _first_look(connection: Connection, person: str, output: Output) -> No
     try:
         reports = await read_as_found(connection, person)
     except* BusLostError as lost:
-        output.error(lost.exceptions[0])  # type: ignore[arg-type]
+        for reason in lost.exceptions:
+            if isinstance(reason, BusLostError):
+                output.error(reason)
     else:
         for error in unreachable(reports).values():
             output.error(error)
