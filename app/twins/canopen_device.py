@@ -20,7 +20,7 @@ from app.twins.nonvolatile import NonVolatile
 from app.twins.object_store import ObjectStore, RefusedAccessError
 from app.twins.pdo_engine import PdoEngine
 from app.twins.ports import Alarm, Line
-from app.twins.sdo_server import SdoServer
+from app.twins.sdo_server import TIMEOUT_NS, SdoServer
 from app.twins.state_file import StateFile
 from app.wire import nmt, sdo, sync
 from app.wire.frame import Can
@@ -108,7 +108,8 @@ class CanopenDevice:
             duration_ns=mount.save_ns,
             delivered=self._delivered(mount.delivered),
         )
-        self._sdo = SdoServer(self.store, line, self._answer)
+        # The client cannot go on before it has the answer, so the turnaround is not its time.
+        self._sdo = SdoServer(self.store, line, self._answer, TIMEOUT_NS + mount.turnaround_ns)
         self._producer = HeartbeatProducer(self.store, line, self._beat)
         self._consumer = HeartbeatConsumer(self.store, line, self._heartbeat_lost, self._route)
         self._pdo = PdoEngine(self.store, line, self._port.send, self._route)

@@ -34,6 +34,9 @@ FaultAction = Callable[[Can], Iterable[tuple[int, Can]]]
 """What becomes of a frame: any number of (delay_ns, frame)."""
 
 INTERMISSION_BITS: Final = 3
+MIN_BITRATE: Final = 10_000
+MAX_BITRATE: Final = 1_000_000
+"""Slowest and fastest bit rate that CiA 301 knows, in bit/s."""
 _NS: Final = 1_000_000_000
 _NEVER: Final = 1 << 63
 
@@ -152,11 +155,14 @@ def arbitration_key(can: Can) -> int:
 
 
 class CanLine:
-    """The line. ``bitrate`` in bit/s, ``start_ns`` is the time at which it begins."""
+    """The line. ``bitrate`` in bit/s, ``start_ns`` is the time at which it begins.
+
+    Raises ValueError where the bit rate is not from ``MIN_BITRATE`` to ``MAX_BITRATE``.
+    """
 
     def __init__(self, bitrate: int, start_ns: int = 0) -> None:
-        if bitrate <= 0:
-            raise ValueError(f"bit rate {bitrate}")
+        if not MIN_BITRATE <= bitrate <= MAX_BITRATE:
+            raise ValueError(f"bit rate {bitrate} is outside {MIN_BITRATE} to {MAX_BITRATE} bit/s")
         self.bitrate = bitrate
         self.now_ns = start_ns
         self.frames = 0

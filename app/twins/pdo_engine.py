@@ -128,7 +128,10 @@ class _Rpdo:
         self._latched = None
 
     def take(self, data: bytes) -> None:
-        """Data came; used at once or kept for the next SYNC. A frame that is too short is not used (7.2.2.5.2)."""
+        """Data came; used at once or kept for the next SYNC. A frame that is too short is not used (7.2.2.5.2).
+
+        CiA 301 has emergency 8210h for that; neither unit's list of errors does (3.2.1.2, table 6), so none is sent.
+        """
         if not self._mapping.entries or len(data) < self._mapping.size:
             return
         if self.parameters.transmission_type <= _MAX_SYNC_TYPE:

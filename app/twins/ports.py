@@ -30,8 +30,9 @@ class Port(Protocol):
 
 
 class Line(Protocol):
-    """A simulated bus with its clock."""
+    """A simulated bus with its clock. ``bitrate`` in bit/s."""
 
+    bitrate: int
     now_ns: int
 
     def attach(self, handler: OnFrame, /) -> Port:

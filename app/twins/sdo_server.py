@@ -1,7 +1,8 @@
 """SDO server (CiA 301, 7.2.4): expedited, segmented and block transfers, one at a time.
 
 Bytes in, bytes out: ``request`` takes the data of a request frame, answers go to the ``reply`` callable. A write that
-takes time (a save) is acknowledged when it is done; requests that come meanwhile wait.
+takes time (a save) is acknowledged when it is done; requests that come meanwhile wait. A transfer whose client falls
+silent is aborted: an open one would keep all others out.
 """
 
 from __future__ import annotations
@@ -22,6 +23,10 @@ _WAITING_LIMIT: Final = 8
 """Requests that wait while a save runs; a client sends one at a time, more are a fault of the client."""
 _DOMAIN_LIMIT: Final = 1 << 16
 """Most bytes that a write may carry; no object of these devices is near it."""
+TIMEOUT_NS: Final = 1_000_000_000
+"""A transfer ends with abort 05040000h when this long none of its frames came, besides the time of a whole block."""
+_LONGEST_FRAME_BITS: Final = 135
+"""8 data bytes, base identifier, most stuff bits, intermission."""
 
 
 @dataclass(slots=True)
@@ -65,13 +70,23 @@ _Transfer = _Upload | _Download | _BlockUpload | _BlockDownload
 
 
 class SdoServer:
-    """Serves one client. ``reply`` gets the 8 bytes of each answer."""
+    """Serves one client. ``reply`` gets the 8 bytes of each answer; ``timeout_ns`` is how long it is waited for."""
 
-    def __init__(self, store: ObjectStore, line: Line, reply: Callable[[bytes, int], None]) -> None:
+    def __init__(
+        self,
+        store: ObjectStore,
+        line: Line,
+        reply: Callable[[bytes, int], None],
+        timeout_ns: int = TIMEOUT_NS,
+    ) -> None:
         self._store = store
         self._reply = reply
         self._transfer: _Transfer | None = None
         self._alarm = Alarm(line)
+        self._silence = Alarm(line)
+        # Between two frames that count there may be a block of segments, ours or ones to be repeated.
+        block_bits = sdo_block.MAX_BLOCK * _LONGEST_FRAME_BITS
+        self._timeout_ns = timeout_ns + block_bits * 1_000_000_000 // line.bitrate
         self._busy = False
         self._waiting: deque[bytes] = deque(maxlen=_WAITING_LIMIT)
 
@@ -81,6 +96,7 @@ class SdoServer:
         self._busy = False
         self._waiting.clear()
         self._alarm.clear()
+        self._silence.clear()
 
     def request(self, data: bytes, t_ns: int) -> None:
         """Take a request frame that was complete at ``t_ns``. Frames of a wrong length are ignored."""
@@ -95,8 +111,21 @@ class SdoServer:
                 self._block_segment(transfer, data, t_ns)
             else:
                 self._dispatch(data, t_ns)
+                self._heard(t_ns)
         except RefusedAccessError as refusal:
             self._abort(data, refusal.code, t_ns)
+
+    def _heard(self, t_ns: int) -> None:
+        """A frame of the open transfer came, if one is open: its client lives."""
+        if self._transfer is None:
+            self._silence.clear()
+        else:
+            self._silence.set(t_ns + self._timeout_ns, self._timed_out)
+
+    def _timed_out(self, t_ns: int) -> None:
+        transfer, self._transfer = self._transfer, None
+        if transfer is not None:
+            self._reply(sdo.abort(transfer.address, Abort.TIMED_OUT), t_ns)
 
     def _dispatch(self, data: bytes, t_ns: int) -> None:
         command = data[0] >> 5
@@ -241,6 +270,7 @@ class SdoServer:
             transfer.data += data[1:]
             self._check_amount_padded(transfer)
             transfer.complete = last
+            self._heard(t_ns)  # out of order it may as well be a request of another transfer, and does not count
         if last or sequence == sdo_block.MAX_BLOCK:
             # Out of order: the client repeats from the last segment that we tell it (7.2.4.3.11).
             self._reply(sdo_block.download_block_ack(transfer.sequence, sdo_block.MAX_BLOCK), t_ns)

@@ -8,7 +8,8 @@ To serve it in real time, give its line to a ``LineThread`` and that to a ``Sock
     with LineThread(line) as thread, SocketcandServer(thread, ...):
         ...
 
-``turbine.problems`` names state files that could not be used. In a test, ``line.run_until`` is the clock.
+``turbine.problems`` names state files that could not be used; a state folder that cannot be one is a UsageError.
+In a test, ``line.run_until`` is the clock.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from app.errors import UsageError
 from app.model.address import Address
 from app.model.description import Description
 from app.twins.canopen_device import MS, SECOND, CanopenDevice, Mount
@@ -136,9 +138,14 @@ class Blade:
 
 
 class Turbine:
-    """Three blades on a line. ``problems`` says which state files could not be used, and why."""
+    """Three blades on a line. ``problems`` says which state files could not be used, and why.
+
+    Makes the state folder; raises UsageError where that cannot be.
+    """
 
     def __init__(self, line: Line, pmm: Description, pmc: Description, settings: Settings) -> None:
+        if settings.state_dir is not None:
+            _make_folder(settings.state_dir)
         self.blades = tuple(Blade(line, number, pmm, pmc, settings) for number in BLADES)
 
     @property
@@ -172,8 +179,18 @@ def build_turbine(
     turnaround_ns: int = MS,
     factory: bool = False,
 ) -> Turbine:
-    """A turbine with the usual settings; call ``power_on`` next."""
+    """A turbine with the usual settings; call ``power_on`` next. Raises UsageError (state folder)."""
     return Turbine(line, pmm, pmc, Settings(state_dir=state_dir, turnaround_ns=turnaround_ns, factory=factory))
+
+
+def _make_folder(folder: Path) -> None:
+    """Tell at the start what else each single save would warn of."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except (FileExistsError, NotADirectoryError) as error:
+        raise UsageError(reason=f"the place for state files, {folder}, is not a folder") from error
+    except OSError as error:
+        raise UsageError(reason=f"the folder for state files, {folder}: {error.strerror or error}") from error
 
 
 def _mount(

@@ -55,8 +55,8 @@ SMALL = description(
 class Bench:
     """A line, a master and one device."""
 
-    def __init__(self, **mount: object) -> None:
-        self.line = CanLine(500_000)
+    def __init__(self, bitrate: int = 500_000, **mount: object) -> None:
+        self.line = CanLine(bitrate)
         self.master = Master(self.line)
         self.device = CanopenDevice(self.line, NODE, SMALL, Mount(boot_ns=50 * MS, **mount))  # type: ignore[arg-type]
         self.device.power_on(0)

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.twins.line import CanLine, Fault, TxOrder, arbitration_key, delay, drop, duplicate
+from app.twins.line import MAX_BITRATE, MIN_BITRATE, CanLine, Fault, TxOrder, arbitration_key, delay, drop, duplicate
 from app.twins.line_thread import LineThread
 from app.wire.can_bits import frame_bits
 from app.wire.frame import Can
@@ -185,6 +185,17 @@ def test_frames_that_cannot_exist_are_refused(line: CanLine) -> None:
         with pytest.raises(ValueError):
             node.port.send(can)
     assert node.port.pending == 0
+
+
+@pytest.mark.parametrize("bitrate", [-500_000, 0, 1, MIN_BITRATE - 1, MAX_BITRATE + 1])
+def test_bit_rates_that_can_cannot_have_are_refused(bitrate: int) -> None:
+    with pytest.raises(ValueError, match=str(bitrate)):
+        CanLine(bitrate)
+
+
+@pytest.mark.parametrize("bitrate", [MIN_BITRATE, MAX_BITRATE])
+def test_the_slowest_and_the_fastest_line(bitrate: int) -> None:
+    assert CanLine(bitrate).bitrate == bitrate
 
 
 def test_filter_clear_and_detach(line: CanLine) -> None:

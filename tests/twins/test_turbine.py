@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from app.errors import UsageError
 from app.model.description import Access, Description
 from app.model.description_file import load_builtin
 from app.twins.line import CanLine
@@ -108,6 +109,21 @@ def test_each_unit_has_its_own_state(tmp_path: Path) -> None:
     assert sorted(path.name for path in tmp_path.iterdir()) == ["oat-pmc-node-011.json", "oat-pmc-node-012.json"]
     again, _turbine = start(tmp_path)
     assert [again.number(node, "6065") for node in (11, 12, 13)] == [111, 122, 100]
+
+
+@pytest.mark.parametrize("below", ["", "wtg-07", "site/wtg-07"])
+def test_a_state_folder_that_is_a_file_is_refused_at_the_start(tmp_path: Path, below: str) -> None:
+    file = tmp_path / "state"
+    file.write_text("kept")
+    with pytest.raises(UsageError, match="not a folder") as caught:
+        start(file / below)
+    assert str(file) in caught.value.details["reason"]
+    assert file.read_text() == "kept"
+
+
+def test_a_state_folder_that_cannot_be_made_is_refused_at_the_start(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="folder for state files"):
+        start(tmp_path / ("x" * 300))
 
 
 def test_load_brings_the_bare_defaults_back() -> None:
