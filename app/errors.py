@@ -14,6 +14,7 @@
     │   ├── LimitError                      the value is out of range; names the limit
     │   ├── PreconditionError               another object or state forbids it
     │   ├── MotionError                     the write could set an axis in motion
+    │   ├── CommunicationError              the write changes PDOs, or is a save or load command
     │   └── ConsentError                    active access needs consent (other master seen)
     ├── DeviceError                exit 4   the device answered and refused
     │   ├── SdoAbortError                   CiA 301 abort code
@@ -119,6 +120,12 @@ class MotionError(RefusedError):
     """The write could set an axis in motion, and nobody has taken charge of that. Details: address, name."""
 
     code = "motion"
+
+
+class CommunicationError(RefusedError):
+    """The write changes PDOs or is a save or load command, and was not asked for as such. Details: address, name."""
+
+    code = "communication"
 
 
 class ConsentError(RefusedError):

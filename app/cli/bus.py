@@ -8,16 +8,26 @@ import contextlib
 import signal
 import sys
 import time
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Callable, Coroutine, Mapping
 from contextlib import asynccontextmanager
 from typing import Any
 
-from app.cli.output import Output, error_text
+from app.cli.arguments import seconds
+from app.cli.output import Output, error_text, tell_warning
 from app.cli.runtime import spare_collector
-from app.cli.targets import add_connection, bare_turbine, descriptions_for, find_device, scanned_turbine, site_turbine
+from app.cli.targets import (
+    Sheets,
+    add_connection,
+    bare_turbine,
+    description_id,
+    descriptions_for,
+    find_device,
+    scanned_turbine,
+    site_turbine,
+)
 from app.drivers.contract import FoundNode
-from app.errors import HubsideError, NoAnswerError, SdoAbortError, UsageError
-from app.model.address import parse_address
+from app.errors import HubsideError, NoAnswerError, RecordingError, UnverifiedError, UsageError
+from app.model.address import Address, is_decimal, parse_address
 from app.model.checks import Allow, check_read
 from app.model.datatypes import Raw
 from app.model.description import Entry
@@ -28,9 +38,10 @@ from app.service.connection import Connection
 from app.service.devices import Target
 from app.service.options import Options
 from app.service.save import restart, save
-from app.service.write import write_text
-from app.wire.sdo import Abort
+from app.service.write import WriteResult, write_text
 
+TERMINATED = 143
+"""Exit code after SIGTERM, as shells have it."""
 SWITCH_INTERVAL_S = 0.0005
 """The receive thread gets its turn sooner than Python's 5 ms, so that a request follows an answer at once."""
 
@@ -38,7 +49,7 @@ SWITCH_INTERVAL_S = 0.0005
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Register the commands."""
 
-    def command(name: str, run: Callable[..., Awaitable[int]], text: str) -> argparse.ArgumentParser:
+    def command(name: str, run: Callable[..., Coroutine[Any, Any, int]], text: str) -> argparse.ArgumentParser:
         parser = commands.add_parser(name, help=text)
         add_connection(parser)
         parser.set_defaults(run=lambda arguments, output: _run(run(arguments, output)))
@@ -54,6 +65,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     write.add_argument("value", help="49.5, '49,5 °C', 0x1F, raw:495 or the name of an enumeration")
     write.add_argument("--factory", action="store_true", help="allow r(w) objects")
     write.add_argument("--motion", action="store_true", help="allow objects that can set an axis in motion (6040h)")
+    write.add_argument("--communication", action="store_true", help="allow PDO parameters, save and load commands")
     write.add_argument("--save", action="store_true", help="then save to non-volatile memory")
     saving = command("save", _save, "save the parameters of a device to its non-volatile memory")
     saving.add_argument("target", help="TURBINE/STATION/DEVICE or a node number")
@@ -63,16 +75,23 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     backup.add_argument("target", nargs="*", help="devices; all of them where none is named")
     backup.add_argument("--reason", default="", help="why, kept in the set")
     record = command("record", _record, "record all frames to MCAP until interrupted")
-    record.add_argument("--seconds", type=float, help="end by itself after so long")
+    record.add_argument("--seconds", type=seconds, help="end by itself after so long")
 
 
-def _run(command: Awaitable[int]) -> int:
+def _run(command: Coroutine[Any, Any, int]) -> int:
     sys.setswitchinterval(SWITCH_INTERVAL_S)
+    return asyncio.run(_until_terminated(command))
 
-    async def main() -> int:
-        return await command
 
-    return asyncio.run(main())
+async def _until_terminated(command: Coroutine[Any, Any, int]) -> int:
+    """SIGTERM ends a command as Ctrl-C does: the bus and the recording are closed."""
+    task = asyncio.ensure_future(command)
+    with contextlib.suppress(NotImplementedError):  # Windows has no such handlers
+        asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, task.cancel)
+    try:
+        return await task
+    except asyncio.CancelledError:
+        return TERMINATED
 
 
 @asynccontextmanager
@@ -81,26 +100,33 @@ async def connected(
 ) -> AsyncIterator[Connection]:
     """The connection that the arguments name; on a bare bus the devices are found by a scan first."""
     turbine = site_turbine(arguments)
+    sheets = _sheets(arguments, output)
     if turbine is None:
         nodes = _named_nodes(arguments)
-        found = await _find(arguments, output, nodes)
-        turbine = scanned_turbine(arguments, found)
+        found = await _find(arguments, output, sheets, nodes)
+        turbine = scanned_turbine(arguments.can, sheets, found)
         _all_there(nodes, found, turbine)
-    connection = _connection(arguments, turbine, arguments.record if record is None else record)
+    connection = _connection(arguments, turbine, sheets, arguments.record if record is None else record)
     spare_collector()
     async with connection:
         yield connection
 
 
-def _connection(arguments: argparse.Namespace, turbine: Turbine, record: bool) -> Connection:
+def _sheets(arguments: argparse.Namespace, output: Output) -> Sheets:
+    return Sheets(arguments.eds, lambda path, warning: tell_warning(output, path, warning))
+
+
+def _connection(arguments: argparse.Namespace, turbine: Turbine, sheets: Sheets, record: bool) -> Connection:
     settings = arguments.settings
+    if record:
+        settings.recordings.mkdir(parents=True, exist_ok=True)
     options = Options(
         person=settings.person,
         recordings=settings.recordings if record else None,
         consent=arguments.consent,
         listen_s=arguments.listen_s,
     )
-    return Connection(turbine, descriptions_for(arguments, turbine), options)
+    return Connection(turbine, descriptions_for(sheets, turbine, arguments.site), options)
 
 
 def _all_there(nodes: list[int] | None, found: list[FoundNode], turbine: Turbine) -> None:
@@ -116,30 +142,33 @@ def _named_nodes(arguments: argparse.Namespace) -> list[int] | None:
     """The node numbers that the command names: nobody else need be asked. None where it names none."""
     named = getattr(arguments, "target", [])
     texts = [named] if isinstance(named, str) else named
-    return [int(text) for text in texts if text.isdigit() and 1 <= int(text) <= 127] or None
+    return [int(text) for text in texts if is_decimal(text) and 1 <= int(text) <= 127] or None
 
 
-async def _find(arguments: argparse.Namespace, output: Output, nodes: list[int] | None = None) -> list[FoundNode]:
+async def _find(
+    arguments: argparse.Namespace, output: Output, sheets: Sheets, nodes: list[int] | None = None
+) -> list[FoundNode]:
     turbine = site_turbine(arguments) or bare_turbine(arguments.can)
     output.say("cli.listening", bus=", ".join(bus.connection for bus in turbine.buses))
-    async with _connection(arguments, turbine, False) as connection:
+    async with _connection(arguments, turbine, sheets, False) as connection:
         found = [await link.driver.scan(nodes) for link in connection.buses.values()]
     return [node for on_bus in found for node in on_bus]
 
 
 async def _scan(arguments: argparse.Namespace, output: Output) -> int:
     started = time.monotonic()
-    found = await _find(arguments, output)
+    sheets = _sheets(arguments, output)
+    found = await _find(arguments, output, sheets)
     if output.as_json:
-        output.result([_found_dict(node) for node in found], "")
+        output.result([_found_dict(node, description_id(sheets, node)) for node in found], "")
     elif found:
         head = ("NODE", "TYPE", "NAME", "HARDWARE", "SOFTWARE", "SERIAL", "DESCRIPTION")
-        output.table(head, [_found_row(node) for node in found])
+        output.table(head, [_found_row(node, description_id(sheets, node)) for node in found])
     output.say("cli.found", count=len(found), took_s=f"{time.monotonic() - started:.1f}")
     return 0 if found else 5
 
 
-def _found_row(node: FoundNode) -> tuple[str, ...]:
+def _found_row(node: FoundNode, description: str | None) -> tuple[str, ...]:
     kind = "–" if node.device_type is None else f"{node.device_type:08X}h"
     serial = "–" if node.identity.serial is None else str(node.identity.serial)
     return (
@@ -149,11 +178,11 @@ def _found_row(node: FoundNode) -> tuple[str, ...]:
         node.hardware or "–",
         node.software or "–",
         serial,
-        node.description_id or "–",
+        description or "–",
     )
 
 
-def _found_dict(node: FoundNode) -> dict[str, Any]:
+def _found_dict(node: FoundNode, description: str | None) -> dict[str, Any]:
     return {
         "node": node.node,
         "device_type": node.device_type,
@@ -164,7 +193,7 @@ def _found_dict(node: FoundNode) -> dict[str, Any]:
         "product": node.identity.product,
         "revision": node.identity.revision,
         "serial": node.identity.serial,
-        "description": node.description_id,
+        "description": description,
         "twin": node.is_twin,
     }
 
@@ -192,19 +221,26 @@ async def _read(arguments: argparse.Namespace, output: Output) -> int:
     _say_unread(report, output)
     took = f"{time.monotonic() - started:.2f}"
     output.say("cli.read_done", device=target.slug, count=len(report.values), took_s=took)
-    return next((error.exit_code for error in report.failed.values()), 0) if addresses else 0
+    return _exit_code(report.failed if addresses else report.errors)
+
+
+def _exit_code(failed: Mapping[Address, HubsideError]) -> int:
+    """0 where nothing failed, else that of the worst: no answer before a refusal."""
+    return max((error.exit_code for error in failed.values()), default=0)
 
 
 def _say_unread(report: ReadReport, output: Output) -> None:
     """Name every object that was not read; those that hold nothing yet (an empty error history) in one line."""
-    empty = [a for a, e in report.failed.items() if isinstance(e, SdoAbortError) and e.abort_code == Abort.NO_DATA]
+    if report.lost is not None:
+        output.error(report.lost)
+        return
+    empty = [address for address in report.failed if address not in report.errors]
     if empty:
         output.say("cli.empty", device=report.target.slug, addresses=", ".join(address.short for address in empty))
-    for address, error in report.failed.items():
-        if address not in empty:
-            name = f"{report.target.slug} {address.short}"
-            title = report.target.entry(address).title
-            output.say("cli.unread", address=name, name=title, reason=error_text(output.texts, error))
+    for address, error in report.errors.items():
+        name = f"{report.target.slug} {address.short}"
+        title = report.target.entry(address).title
+        output.say("cli.unread", address=name, name=title, reason=error_text(output.texts, error))
 
 
 def _value_row(target: Target, entry: Entry, raw: Raw, output: Output) -> tuple[str, ...]:
@@ -239,32 +275,40 @@ async def _write(arguments: argparse.Namespace, output: Output) -> int:
     async with connected(arguments, output) as connection:
         target = _target(connection, arguments.target)
         entry = target.entry(address)
-        driver = connection.driver(target)
-        allow = Allow.FACTORY if arguments.factory else Allow.NOTHING
-        allow |= Allow.MOTION if arguments.motion else Allow.NOTHING
-        result = await write_text(
-            driver,
-            target,
-            address,
-            arguments.value,
-            connection.journal,
-            allow=allow,
-        )
-        was = "–" if result.was is None else show(entry, result.was, target.lookup)
-        now = show(entry, result.sent if result.read is None else result.read, target.lookup)
-        output.result(
-            {
-                "device": target.slug,
-                "address": str(address),
-                "was": result.was,
-                "now": result.read,
-                "verified": result.verified,
-            },
-            output.texts("cli.written", device=target.slug, address=address.short, name=entry.title, was=was, now=now),
-        )
-        if arguments.save:
+        try:
+            result = await write_text(
+                connection.driver(target),
+                target,
+                address,
+                arguments.value,
+                connection.journal,
+                allow=_allowed(arguments),
+            )
+        except asyncio.CancelledError:
+            output.say("cli.write_interrupted", device=target.slug, address=address.short, name=entry.title)
+            raise
+        _tell_written(target, entry, result, output)
+        if arguments.save and result.verified:
             await _save_one(connection, target, output)
-    return 0
+    return 0 if result.verified else UnverifiedError.exit_code
+
+
+def _allowed(arguments: argparse.Namespace) -> Allow:
+    allow = Allow.FACTORY if arguments.factory else Allow.NOTHING
+    allow |= Allow.MOTION if arguments.motion else Allow.NOTHING
+    return allow | (Allow.COMMUNICATION if arguments.communication else Allow.NOTHING)
+
+
+def _tell_written(target: Target, entry: Entry, result: WriteResult, output: Output) -> None:
+    """What is known of the write: read back equal, acknowledged where that is the rule, or sent and unproven."""
+    key = "written" if result.read is not None else "acknowledged" if result.verified else "unproven"
+    was = "–" if result.was is None else show(entry, result.was, target.lookup)
+    now = show(entry, result.sent if result.read is None else result.read, target.lookup)
+    place = {"device": target.slug, "address": str(result.address)}
+    output.result(
+        {**place, "was": result.was, "sent": result.sent, "now": result.read, "verified": result.verified},
+        output.texts(f"cli.{key}", device=target.slug, address=entry.address.short, name=entry.title, was=was, now=now),
+    )
 
 
 async def _save(arguments: argparse.Namespace, output: Output) -> int:
@@ -303,9 +347,10 @@ async def _backup(arguments: argparse.Namespace, output: Output) -> int:
     code = 0
     for report in reports:
         target = report.target
-        if not report.values:
-            output.error(next(iter(report.failed.values())))
-            code = 5
+        code = max(code, _exit_code(report.errors))
+        if not report.values or report.lost is not None:
+            output.error(report.lost or next(iter(report.failed.values())))
+            output.say("cli.no_set", device=target.slug)
             continue
         parameters = to_set(report, connection.turbine.slug, settings.person, arguments.reason, time.time_ns())
         path = write_set(settings.sets / connection.turbine.slug, parameters)
@@ -313,7 +358,7 @@ async def _backup(arguments: argparse.Namespace, output: Output) -> int:
         details = {
             "file": str(path),
             "count": len(report.values),
-            "unread": len(report.failed),
+            "unread": len(report.errors),
             "hash": parameters.hash,
         }
         short = details | {"hash": parameters.hash[:12]}
@@ -329,19 +374,18 @@ async def _record(arguments: argparse.Namespace, output: Output) -> int:
     for number in (signal.SIGINT, signal.SIGTERM):
         with contextlib.suppress(NotImplementedError):  # Windows: Ctrl-C comes as KeyboardInterrupt
             loop.add_signal_handler(number, stop.set)
-    connection = _connection(arguments, turbine, True)
-    try:
-        async with connection:
-            output.say("cli.stop_hint")
-            with contextlib.suppress(TimeoutError):
-                await asyncio.wait_for(_show_recording(connection, output, stop), arguments.seconds)
-    finally:
-        status = None if connection.recording is None else connection.recording.status()
-    if status is None:
-        raise HubsideError(reason="no recording")
+    connection = _connection(arguments, turbine, _sheets(arguments, output), True)
+    async with connection:
+        output.say("cli.stop_hint")
+        with contextlib.suppress(TimeoutError):
+            await asyncio.wait_for(_show_recording(connection, output, stop), arguments.seconds)
+    status = connection.recorded
     size = f"{status.size_bytes / 1e6:.2f} MB"
     details = {"file": str(status.file), "frames": status.frames, "size": size, "lost": status.lost}
     output.result(details, output.texts("cli.recording", **details))
+    if status.file is None or status.reason is not None:
+        reason = status.detail or (status.reason.value if status.reason else "no file")
+        raise RecordingError(file=str(arguments.settings.recordings), offset=0, reason=reason)
     return 0
 
 

@@ -16,7 +16,7 @@ from typing import Final
 
 from app import __version__
 from app.cli.output import Output
-from app.errors import HubsideError
+from app.errors import HubsideError, UsageError
 from app.model.texts import load_texts
 from app.settings import settings_from
 
@@ -52,6 +52,13 @@ def _add_common(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point; gives the exit code."""
+    try:
+        return _main(arguments)
+    except KeyboardInterrupt:
+        return 130
+
+
+def _main(arguments: Sequence[str] | None) -> int:
     parsed = build_parser().parse_args(arguments)
     logging.basicConfig(
         level=logging.DEBUG if parsed.verbose else logging.WARNING,
@@ -65,9 +72,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except HubsideError as error:
         output.error(error)
         return error.exit_code
-    except KeyboardInterrupt:
-        return 130
     except BrokenPipeError:  # the reader of our output went away, as `| head` does
         sys.stdout = None
         return 0
+    except OSError as error:  # a file or folder that the command named
+        place = f"{error.filename}: " if error.filename else ""
+        wrong = UsageError(reason=f"{place}{error.strerror or error}")
+        output.error(wrong)
+        return wrong.exit_code
     return code

@@ -5,12 +5,14 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from app.cli.output import Output
+from app.cli.output import Output, tell_warning
+from app.cli.targets import SHEET_SUFFIXES
 from app.errors import UsageError
 from app.model.address import parse_address
 from app.model.checks import limits_of
 from app.model.description import Description, Entry
 from app.model.description_file import BUILTIN, builtin_folder, load, load_builtin, problems
+from app.model.eds import load_eds
 from app.model.eds_write import to_eds, write_all
 from app.model.od_export import to_csv, to_json
 from app.model.values import show
@@ -40,19 +42,28 @@ def run(arguments: argparse.Namespace, output: Output) -> int:
         case "list":
             return _list(output)
         case "show":
-            return _show(find(arguments.device), arguments.address, output)
+            return _show(find(arguments.device, output), arguments.address, output)
         case "check":
             return _check(arguments.file, output)
         case _:
             return _export(arguments, output)
 
 
-def find(device: str) -> Description:
-    """A description by its id, or from a file. Raises UsageError or DescriptionError."""
+def find(device: str, output: Output) -> Description:
+    """A description by its id, or from a file (ours, EDS or DCF). Raises UsageError or DescriptionError."""
     path = Path(device)
     if device not in BUILTIN and path.suffix == ".toml":
         return load(path)
+    if path.suffix.lower() in SHEET_SUFFIXES:
+        return _sheet(path, output)
     return load_builtin(device)
+
+
+def _sheet(path: Path, output: Output) -> Description:
+    loaded = load_eds(path)
+    for warning in loaded.warnings:
+        tell_warning(output, path, warning)
+    return loaded.description
 
 
 def _list(output: Output) -> int:
@@ -148,6 +159,9 @@ def _detail(description: Description, entry: Entry, output: Output) -> None:
 
 
 def _check(file: Path | None, output: Output) -> int:
+    if file is not None and file.suffix.lower() in SHEET_SUFFIXES:
+        output.say("cli.check_read", file=file, count=len(_sheet(file, output).entries))
+        return 0
     files = [file] if file is not None else [builtin_folder() / name for name in BUILTIN.values()]
     found = [problem for path in files for problem in problems(path)]
     for problem in found:
@@ -165,9 +179,9 @@ def _export(arguments: argparse.Namespace, output: Output) -> int:
     if arguments.device is None:
         raise UsageError(reason="name a device, or --all-eds FOLDER")
     writers = {"csv": to_csv, "eds": to_eds, "json": to_json}
-    text = writers[arguments.format](find(arguments.device))
+    text = writers[arguments.format](find(arguments.device, output))
     if arguments.output is None:
-        output.line(text.rstrip("\r\n"))
+        output.raw(text)
     else:
         arguments.output.write_bytes(text.encode("utf-8"))
     return 0

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any, TextIO
 
 from app.errors import (
@@ -16,6 +17,7 @@ from app.errors import (
     UnverifiedError,
     UsageError,
 )
+from app.model.eds import EdsWarning
 from app.model.texts import Texts
 
 
@@ -32,6 +34,16 @@ class Output:
     def line(self, text: str) -> None:
         """One line of the result."""
         print(text, file=self._out, flush=True)
+
+    def raw(self, text: str) -> None:
+        """A file's text as it is, its line ends kept."""
+        self._out.flush()
+        binary = getattr(self._out, "buffer", None)
+        if binary is None:
+            self._out.write(text)
+        else:
+            binary.write(text.encode("utf-8"))
+            binary.flush()
 
     def result(self, data: Any, text: str) -> None:
         """The result: ``data`` as JSON for machines, ``text`` for people."""
@@ -73,6 +85,12 @@ class Output:
         if self._open_progress:
             print(file=self._err)
             self._open_progress = False
+
+
+def tell_warning(output: Output, path: Path, warning: EdsWarning) -> None:
+    """One warning of an EDS or DCF file, with its line."""
+    text = output.texts(warning.text_key, **warning.details)
+    output.say("cli.eds_warning", file=path, line=warning.line, text=text)
 
 
 def error_text(texts: Texts, error: HubsideError) -> str:

@@ -41,7 +41,12 @@ def _export(arguments: argparse.Namespace, output: Output) -> int:
 
 def _recover(arguments: argparse.Namespace, output: Output) -> int:
     folder: Path = arguments.folder or arguments.settings.recordings
-    for recovery in recover_all(folder, time.time_ns()):
+    if not folder.is_dir():
+        raise UsageError(reason=f"{folder} is no folder")
+    recoveries = recover_all(folder, time.time_ns())
+    if not recoveries:
+        output.say("cli.nothing_to_recover", folder=folder)
+    for recovery in recoveries:
         details = {"file": str(recovery.file), "frames": recovery.frames, "dropped": recovery.lost_bytes}
         output.result(details, output.texts("cli.recovered", **details))
     return 0

@@ -15,6 +15,7 @@ from collections.abc import AsyncIterator, Coroutine, Iterator
 from pathlib import Path
 from typing import Any
 
+from app.cli.arguments import milliseconds, port
 from app.cli.bus import SWITCH_INTERVAL_S, connected
 from app.cli.output import Output
 from app.cli.targets import add_connection
@@ -36,10 +37,12 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     serve.add_argument("--no-record", action="store_true", help="do not record")
     serve.set_defaults(run=lambda arguments, output: _start(_serve(arguments, output)))
     demo = commands.add_parser("demo", help="twins of three blades, and the page on them")
-    demo.add_argument("--turnaround-ms", type=float, default=1.0, help="time a twin takes to answer")
+    demo.add_argument("--turnaround-ms", type=milliseconds, default=1.0, help="time a twin takes to answer")
     demo.set_defaults(run=_demo, consent=False, listen_s=0.5, eds=[], turbine=None, can=None, no_record=False)
     for parser in (serve, demo):
-        parser.add_argument("--port", type=int, default=DEFAULT_PORT, help="loopback port of the page; 0: any free one")
+        parser.add_argument(
+            "--port", type=port, default=DEFAULT_PORT, help="loopback port of the page; 0: any free one"
+        )
 
 
 def _start(command: Coroutine[Any, Any, int]) -> int:
@@ -50,6 +53,7 @@ def _start(command: Coroutine[Any, Any, int]) -> int:
 def _demo(arguments: argparse.Namespace, output: Output) -> int:
     """Start the twins as a process of their own, then serve their page."""
     state = arguments.settings.data / "twins"
+    state.mkdir(parents=True, exist_ok=True)
     with _twins(arguments, state) as address:
         arguments.site = _demo_site(arguments.settings.data, address)
         return _start(_serve(arguments, output))
@@ -59,11 +63,13 @@ def _demo(arguments: argparse.Namespace, output: Output) -> int:
 def _twins(arguments: argparse.Namespace, state: Path) -> Iterator[str]:
     """Twins in a process of their own, on the usual port or, where that is taken, on a free one."""
     error = ""
-    for port in (TWIN_PORT, 0):
+    for tried in (TWIN_PORT, 0):
         command = [sys.executable, "-m", "app.cli", "twin", "oat", "--json", "--while-stdin", "--state", str(state)]
-        command += ["--can", f"socketcand:127.0.0.1:{port}", "--turnaround-ms", str(arguments.turnaround_ms)]
+        command += ["--can", f"socketcand:127.0.0.1:{tried}", "--turnaround-ms", str(arguments.turnaround_ms)]
         pipe = subprocess.PIPE
-        with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, text=True) as process:
+        # A group of its own: Ctrl-C is for us, and the twins stay until the recording is closed.
+        alone: dict[str, Any] = {"start_new_session": True} if sys.platform != "win32" else {"creationflags": 0x200}
+        with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, text=True, **alone) as process:
             try:
                 line = process.stdout.readline() if process.stdout is not None else ""
                 if line:
@@ -73,7 +79,16 @@ def _twins(arguments: argparse.Namespace, state: Path) -> Iterator[str]:
             finally:
                 process.terminate()
                 process.wait(START_S)
-    raise BusOpenError(bus="twins", reason=error.strip() or "the twins did not start")
+    raise BusOpenError(bus="twins", reason=_reason(error) or "the twins did not start")
+
+
+def _reason(error: str) -> str:
+    """The text of an error that another of our processes told as JSON."""
+    last = error.strip().splitlines()[-1:] or [""]
+    try:
+        return str(json.loads(last[0])["text"])
+    except (ValueError, KeyError, TypeError):
+        return last[0]
 
 
 def _demo_site(folder: Path, address: str) -> Path:
@@ -132,13 +147,13 @@ async def _page(arguments: argparse.Namespace, output: Output, connection: Conne
     from app.web.serve import launch_url, open_port, port_of, serve
 
     listener = open_port(arguments.port)
-    port = port_of(listener)
+    at = port_of(listener)
     access = Access(time.monotonic)
     scene = await asyncio.to_thread(HubScene, secrets.token_urlsafe(32))
     try:
-        application = create_app(connection, access, port, scene, arguments.settings.language)
+        application = create_app(connection, access, at, scene, arguments.settings.language)
         async with serve(application, listener):
-            url = launch_url(port, access.issue_token())
+            url = launch_url(at, access.issue_token())
             output.result({"url": url}, output.texts("cli.page", url=url))
             yield
     finally:

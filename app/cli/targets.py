@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
+from app.cli.arguments import seconds
 from app.drivers.contract import FoundNode
 from app.errors import UsageError
+from app.model.address import is_decimal
 from app.model.description import Description
 from app.model.description_file import BUILTIN, load_builtin
-from app.model.eds import load_eds
+from app.model.eds import EdsWarning, load_eds
 from app.model.site import BusConfig, Device, Station, Turbine, load_site
 
 BUS = "can0"
-_SHEETS = (".eds", ".dcf")
+SHEET_SUFFIXES = (".eds", ".dcf")
 
 
 def add_connection(parser: argparse.ArgumentParser) -> None:
-    """``--site`` or ``--can``, ``--consent``, ``--no-record``."""
+    """``--site`` or ``--can``, and how the connection is made."""
     where = parser.add_mutually_exclusive_group(required=True)
     where.add_argument("--site", type=Path, help="site file that names turbines, stations and devices")
     where.add_argument(
@@ -32,7 +35,7 @@ def add_connection(parser: argparse.ArgumentParser) -> None:
         help="EDS or DCF of a device that has no description here; without NODE for every such device",
     )
     parser.add_argument("--consent", action="store_true", help="go active although another master is on the bus")
-    parser.add_argument("--listen-s", type=float, default=0.5, help="how long to listen before anything is sent")
+    parser.add_argument("--listen-s", type=seconds, default=0.5, help="how long to listen before anything is sent")
     parser.add_argument("--record", action="store_true", help="record all frames meanwhile")
 
 
@@ -50,36 +53,51 @@ def site_turbine(arguments: argparse.Namespace) -> Turbine | None:
     raise UsageError(reason=f"--turbine names one of: {known}")
 
 
-def descriptions_for(arguments: argparse.Namespace, turbine: Turbine | None) -> dict[str, Description]:
+class Sheets:
+    """The EDS and DCF files of a command line, read once; ``told`` gets every warning with its line."""
+
+    def __init__(self, texts: Sequence[str], told: Callable[[Path, EdsWarning], None]) -> None:
+        self._told = told
+        self._loaded = [self._load(*_node_and_path(text)) for text in texts]
+
+    def _load(self, node: int | None, path: Path) -> tuple[int | None, Description]:
+        return node, self.read(path, node)
+
+    def read(self, path: Path, node: int | None) -> Description:
+        """One file. Raises DescriptionError."""
+        loaded = load_eds(path, node)
+        for warning in loaded.warnings:
+            self._told(path, warning)
+        return loaded.description
+
+    def __iter__(self) -> Iterator[Description]:
+        return (description for _node, description in self._loaded)
+
+    def named_for(self, node: int) -> str | None:
+        """Id of the description that was given for this very node."""
+        return next((description.id for wanted, description in self._loaded if wanted == node), None)
+
+    def for_any(self) -> str | None:
+        """Id of the description that was given for every node that nothing else describes."""
+        return next((description.id for wanted, description in self._loaded if wanted is None), None)
+
+
+def _node_and_path(text: str) -> tuple[int | None, Path]:
+    node, equals, file = text.partition("=")
+    return (int(node), Path(file)) if equals and is_decimal(node) else (None, Path(text))
+
+
+def descriptions_for(sheets: Sheets, turbine: Turbine, site: Path | None) -> dict[str, Description]:
     """All descriptions that may be needed, by the id that devices name: ours, and EDS or DCF files.
 
     A site file may name an EDS file in place of an id; its path starts at the site file. Raises DescriptionError.
     """
-    known = {name: load_builtin(name) for name in BUILTIN}
-    if turbine is not None:
-        for device in turbine.devices:
-            if device.description_id not in known and Path(device.description_id).suffix.lower() in _SHEETS:
-                path = arguments.site.parent / device.description_id
-                known[device.description_id] = load_eds(path, device.node).description
-    for _node, path in _sheets(arguments):
-        known[str(path)] = load_eds(path).description
+    known = {name: load_builtin(name) for name in BUILTIN} | {one.id: one for one in sheets}
+    for device in turbine.devices:
+        name = device.description_id
+        if site is not None and name not in known and Path(name).suffix.lower() in SHEET_SUFFIXES:
+            known[name] = sheets.read(site.parent / name, device.node)
     return known
-
-
-def _sheets(arguments: argparse.Namespace) -> list[tuple[int | None, Path]]:
-    pairs: list[tuple[int | None, Path]] = []
-    for text in arguments.eds:
-        node, equals, file = text.partition("=")
-        pairs.append((int(node), Path(file)) if equals and node.isdigit() else (None, Path(text)))
-    return pairs
-
-
-def _sheet_for(arguments: argparse.Namespace, node: int) -> str | None:
-    """Key of the EDS file that was given for ``node``."""
-    for wanted, path in _sheets(arguments):
-        if wanted in (node, None):
-            return str(path)
-    return None
 
 
 def bare_turbine(connection: str) -> Turbine:
@@ -87,10 +105,14 @@ def bare_turbine(connection: str) -> Turbine:
     return Turbine("bus", connection, (BusConfig(BUS, connection, 0),), ())
 
 
-def scanned_turbine(arguments: argparse.Namespace, found: list[FoundNode]) -> Turbine:
+def description_id(sheets: Sheets, found: FoundNode) -> str | None:
+    """What describes a device: the file named for its node, else what it was recognised as, else a file for any."""
+    return sheets.named_for(found.node) or found.description_id or sheets.for_any()
+
+
+def scanned_turbine(connection: str, sheets: Sheets, found: list[FoundNode]) -> Turbine:
     """The turbine of one bus with the devices that a scan has recognised, or that an EDS was given for."""
-    connection = arguments.can
-    described = [(one.node, one.description_id or _sheet_for(arguments, one.node)) for one in found]
+    described = [(one.node, description_id(sheets, one)) for one in found]
     devices = tuple(
         Device(f"bus/nodes/{node}", f"node {node}", description, BUS, node)
         for node, description in described

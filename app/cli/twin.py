@@ -9,8 +9,10 @@ import sys
 import threading
 from pathlib import Path
 
+from app.cli.arguments import bitrate, milliseconds
 from app.cli.output import Output
 from app.errors import BusOpenError, UsageError
+from app.model.address import is_decimal
 from app.model.description_file import load_builtin
 from app.twins.line import CanLine
 from app.twins.line_thread import LineThread
@@ -28,8 +30,8 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     oat = kinds.add_parser("oat", help="three blades, a PMM and a PMC each, on one CAN bus")
     oat.add_argument("--can", default="socketcand:127.0.0.1:29536", metavar="socketcand:HOST:PORT")
     oat.add_argument("--state", type=Path, metavar="DIR", help="where saved parameters are kept")
-    oat.add_argument("--bitrate", type=int, default=500_000)
-    oat.add_argument("--turnaround-ms", type=float, default=1.0, help="time a drive takes to answer")
+    oat.add_argument("--bitrate", type=bitrate, default=500_000)
+    oat.add_argument("--turnaround-ms", type=milliseconds, default=1.0, help="time a drive takes to answer")
     oat.add_argument("--while-stdin", action="store_true", help="end when standard input ends, as the caller has")
     oat.add_argument("--factory", action="store_true", help="allow writing of r(w) objects")
     parser.set_defaults(run=run)
@@ -40,8 +42,6 @@ def run(arguments: argparse.Namespace, output: Output) -> int:
     sys.setswitchinterval(SWITCH_INTERVAL_S)
     gc.freeze()
     host, port = _address(arguments.can)
-    if arguments.bitrate <= 0 or arguments.turnaround_ms < 0:
-        raise UsageError(reason="bit rate and turnaround are positive")
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
@@ -88,6 +88,6 @@ def _announce(address: str, devices: int, bitrate: int, output: Output) -> None:
 def _address(text: str) -> tuple[str, int]:
     interface, _, place = text.partition(":")
     host, _, port = place.rpartition(":")
-    if interface != "socketcand" or not host or not port.isdigit():
+    if interface != "socketcand" or not host or not is_decimal(port) or int(port) > 65535:
         raise UsageError(reason=f"'{text}': twins are served as socketcand:HOST:PORT")
     return host, int(port)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from app.errors import UsageError
 
 _OD = re.compile(r"^(?:0x)?([0-9A-Fa-f]{4})h?(?:[:./]([0-9A-Fa-f]{1,2})h?)?$")
-_PKW = re.compile(r"^(\d{1,3})/(\d{1,3})$")
+_PKW = re.compile(r"^([0-9]{1,3})/([0-9]{1,3})$")
 
 
 class Addressing(Enum):
@@ -40,6 +40,11 @@ class Address(NamedTuple):
         if self.addressing is Addressing.OD and self.minor == 0:
             return f"{self.major:04X}"
         return str(self)
+
+
+def is_decimal(text: str) -> bool:
+    """True for plain decimal digits, few enough for any number that we read."""
+    return text.isascii() and text.isdecimal() and len(text) <= 12
 
 
 def parse_address(text: str) -> Address:

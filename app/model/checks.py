@@ -4,11 +4,16 @@ from __future__ import annotations
 
 from decimal import Decimal
 from enum import Flag, auto
+from typing import Final
 
-from app.errors import AccessError, LimitError, MotionError, PreconditionError, ValueTypeError
+from app.errors import AccessError, CommunicationError, LimitError, MotionError, PreconditionError, ValueTypeError
+from app.model.address import Addressing
 from app.model.datatypes import Raw, encode_raw
 from app.model.description import Access, Description, Entry, Limit, LimitRef, Lookup
 from app.model.values import quantity_of, show
+
+STORE_PARAMETERS: Final = 0x1010
+RESTORE_DEFAULTS: Final = 0x1011
 
 
 class Allow(Flag):
@@ -19,6 +24,8 @@ class Allow(Flag):
     """Write r(w) objects, which only the maker sets."""
     MOTION = auto()
     """Write objects that can set an axis in motion."""
+    COMMUNICATION = auto()
+    """Change PDOs (14xxh to 1Axxh), or write save and load commands as if they were values."""
 
 
 def check_read(entry: Entry) -> None:
@@ -46,6 +53,8 @@ def check_write(
         raise AccessError(address=entry.address.short, name=entry.title, access=entry.access.value)
     if entry.motion and Allow.MOTION not in allow:
         raise MotionError(address=entry.address.short, name=entry.title)
+    if _is_communication(description, entry) and Allow.COMMUNICATION not in allow:
+        raise CommunicationError(address=entry.address.short, name=entry.title)
     data = _encode(entry, raw)
     if isinstance(raw, int | float):
         _check_limits(entry, raw, lookup, variant)
@@ -60,6 +69,15 @@ def check_write(
                 found=str(found),
             )
     return data
+
+
+def _is_communication(description: Description, entry: Entry) -> bool:
+    """PDO parameters and mappings of CiA 301, and the commands that save or load."""
+    if entry.address in {command.address for command in (*description.save, *description.load)}:
+        return True
+    index = entry.address.major
+    is_od = entry.address.addressing is Addressing.OD
+    return is_od and (0x1400 <= index < 0x1C00 or index in (STORE_PARAMETERS, RESTORE_DEFAULTS))
 
 
 def limits_of(entry: Entry, lookup: Lookup, variant: str | None = None) -> tuple[Decimal | None, Decimal | None]:

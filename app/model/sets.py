@@ -48,7 +48,10 @@ class Origin:
 
 @dataclass(frozen=True, slots=True)
 class ParameterSet:
-    """The raw values of one device; ``unread`` names every readable object that did not answer, and why."""
+    """The raw values of one device; ``unread`` names every readable object that did not answer, and why.
+
+    ``empty`` names those that hold no data, as an empty error history does: they are read, there is nothing in them.
+    """
 
     description_id: str
     description_version: str
@@ -56,6 +59,7 @@ class ParameterSet:
     origin: Origin
     values: Mapping[Address, Raw]
     unread: Mapping[Address, str] = field(default_factory=dict)
+    empty: tuple[Address, ...] = ()
 
     @property
     def complete(self) -> bool:
@@ -81,6 +85,7 @@ def dump_set(parameters: ParameterSet) -> str:
         "hash": f"sha256:{parameters.hash}",
         "complete": parameters.complete,
         "description": {"id": parameters.description_id, "version": parameters.description_version},
+        "empty": [str(address) for address in parameters.empty],
         "identity": asdict(parameters.identity),
         "origin": asdict(parameters.origin),
         "unread": {str(address): reason for address, reason in parameters.unread.items()},
@@ -109,6 +114,7 @@ def load_set(text: str, file: str) -> ParameterSet:
             origin=Origin(**content["origin"]),
             values={_address(text, file, key): _from_json(raw) for key, raw in content["values"].items()},
             unread={_address(text, file, key): str(why) for key, why in content.get("unread", {}).items()},
+            empty=tuple(_address(text, file, key) for key in content.get("empty", ())),
         )
     except (KeyError, TypeError, AttributeError, ValueError) as error:
         raise SetFileError(file=file, line=1, reason=f"a part is missing or of another shape: {error}") from error

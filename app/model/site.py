@@ -72,9 +72,9 @@ def load_site(path: Path) -> tuple[Turbine, ...]:
     try:
         data = tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
-        raise SiteError(file=str(path), key="", reason=f"cannot be read: {error}") from error
+        raise SiteError(file=str(path), key="*", reason=f"cannot be read: {error}") from error
     except tomllib.TOMLDecodeError as error:
-        raise SiteError(file=str(path), key="", reason=f"no valid TOML: {error}") from error
+        raise SiteError(file=str(path), key="*", reason=f"no valid TOML: {error}") from error
     return _Reader(str(path)).turbines(data)
 
 
@@ -86,12 +86,18 @@ class _Reader:
         return SiteError(file=self._file, key=key, reason=reason)
 
     def turbines(self, data: Mapping[str, Any]) -> tuple[Turbine, ...]:
+        self._known(data, "schema turbine", "")
         if data.get("schema") != SCHEMA:
             raise self._wrong("schema", f"is {data.get('schema')!r}, this version reads {SCHEMA}")
         found = tuple(self._turbine(slug, table) for slug, table in self._tables(data, "turbine", ""))
         if not found:
             raise self._wrong("turbine", "no turbine is named")
         return found
+
+    def _known(self, table: Mapping[str, Any], keys: str, where: str) -> None:
+        for key in table:
+            if key not in keys.split():
+                raise self._wrong(f"{where}{key}", f"is no key here (there are: {', '.join(keys.split())})")
 
     def _tables(self, table: Mapping[str, Any], key: str, where: str) -> Iterator[tuple[str, Mapping[str, Any]]]:
         children = table.get(key, {})
@@ -106,9 +112,14 @@ class _Reader:
 
     def _turbine(self, slug: str, table: Mapping[str, Any]) -> Turbine:
         where = f"turbine.{slug}."
+        self._known(table, "name bus station", where)
+        for name, bus in self._tables(table, "bus", where):
+            self._known(bus, "connection bitrate", f"{where}bus.{name}.")
         buses = tuple(
             BusConfig(
-                name, self._text(bus, "connection", f"{where}bus.{name}."), self._int(bus, "bitrate", where, 500_000)
+                name,
+                self._text(bus, "connection", f"{where}bus.{name}."),
+                self._int(bus, "bitrate", f"{where}bus.{name}.", 500_000),
             )
             for name, bus in self._tables(table, "bus", where)
         )
@@ -125,6 +136,7 @@ class _Reader:
 
     def _station(self, turbine: str, slug: str, table: Mapping[str, Any], buses: tuple[BusConfig, ...]) -> Station:
         where = f"turbine.{turbine}.station.{slug}."
+        self._known(table, "name blade device", where)
         devices = tuple(
             self._device(f"{turbine}/{slug}/{name}", device, f"{where}device.{name}.", buses)
             for name, device in self._tables(table, "device", where)
@@ -135,6 +147,7 @@ class _Reader:
         return Station(f"{turbine}/{slug}", str(table.get("name", slug.replace("-", " "))), blade, devices)
 
     def _device(self, slug: str, table: Mapping[str, Any], where: str, buses: tuple[BusConfig, ...]) -> Device:
+        self._known(table, "name description bus node", where)
         node = self._int(table, "node", where, None)
         if not 1 <= node <= 127:
             raise self._wrong(f"{where}node", f"is {node}, not 1 to 127")

@@ -15,7 +15,8 @@ from app.model.address import Address
 from app.model.datatypes import DataType, Raw
 from app.model.description import Description, Entry, LimitRef, Lookup, Quantity
 
-_NUMBER = re.compile(r"^([-+]?\d+(?:[.,]\d+)?)\s*(\D.*)?$")
+_NUMBER = re.compile(r"^([-+]?[0-9]+(?:[.,][0-9]+)?)\s*((?![eE][-+]?[0-9])[^0-9].*)?$")
+MAX_TEXT = 1000
 _HEX = re.compile(r"^(?:0x([0-9A-Fa-f]+)|([0-9A-Fa-f]+)h)$")
 
 
@@ -73,6 +74,8 @@ def parse(description: Description, entry: Entry, text: str, lookup: Lookup) -> 
     the type, where the unit is another one, or where the number lies between two raw values.
     """
     text = text.strip()
+    if len(text) > MAX_TEXT:
+        raise _misfit(entry, text[:20] + "…", f"more than {MAX_TEXT} characters")
     if entry.type in (DataType.VISIBLE_STRING, DataType.UNICODE_STRING):
         return text
     if not entry.type.is_integer and entry.type.bits is None:

@@ -11,12 +11,13 @@ from typing import Final
 
 from app import __version__
 from app.drivers.contract import Driver
-from app.errors import HubsideError, SdoAbortError
+from app.errors import BusLostError, HubsideError, SdoAbortError
 from app.model.address import Address
 from app.model.datatypes import Raw
 from app.model.description import Description
 from app.model.sets import Identity, Origin, ParameterSet, dump_set
 from app.service.devices import Target, decode
+from app.wire.sdo import Abort
 
 DeviceProgress = Callable[[Target, int, int], None]
 """Called with the device, the objects done and the objects in all."""
@@ -40,6 +41,16 @@ class ReadReport:
     target: Target
     values: Mapping[Address, Raw]
     failed: Mapping[Address, HubsideError]
+
+    @property
+    def errors(self) -> dict[Address, HubsideError]:
+        """What failed, without the objects that only hold no data."""
+        return {address: error for address, error in self.failed.items() if not is_empty(error)}
+
+    @property
+    def lost(self) -> BusLostError | None:
+        """The bus was lost on the way: the values are of no one moment."""
+        return next((error for error in self.failed.values() if isinstance(error, BusLostError)), None)
 
 
 def readable(description: Description) -> list[Address]:
@@ -91,8 +102,14 @@ def to_set(report: ReadReport, turbine: str, person: str, reason: str, wall_ns: 
         identity=Identity(**found),  # type: ignore[arg-type]  # the types are those of the description
         origin=Origin(turbine, target.slug, target.node, time, person, reason, f"hubside {__version__}"),
         values=report.values,
-        unread={address: why(error) for address, error in report.failed.items()},
+        unread={address: why(error) for address, error in report.failed.items() if not is_empty(error)},
+        empty=tuple(address for address, error in report.failed.items() if is_empty(error)),
     )
+
+
+def is_empty(error: HubsideError) -> bool:
+    """True where the device answered that the object holds no data, as an empty error history does."""
+    return isinstance(error, SdoAbortError) and error.abort_code == Abort.NO_DATA
 
 
 def why(error: HubsideError) -> str:

@@ -9,10 +9,11 @@ from threading import Lock
 from typing import Any, Final
 
 from app.drivers.contract import DriverStatus, LinkState, MasterSign
-from app.errors import UsageError
+from app.errors import RecordingError, UsageError
 from app.model.description import Bus, Description
 from app.model.site import Device, Turbine
 from app.recording.content import RecorderClock
+from app.recording.writer import RecorderStatus
 from app.service.bus_link import BusLink
 from app.service.devices import Target
 from app.service.journal import Journal, Kind
@@ -90,6 +91,13 @@ class Connection:
     async def __aexit__(self, *_exc: object) -> None:
         await self.close()
 
+    @property
+    def recorded(self) -> RecorderStatus:
+        """What the recorder has done. Raises RecordingError where nothing was to be recorded."""
+        if self.recording is None:
+            raise RecordingError(file="", offset=0, reason="nothing is recorded")
+        return self.recording.status()
+
     # -- devices ----------------------------------------------------------------
 
     def target(self, slug: str) -> Target:
@@ -120,6 +128,8 @@ class Connection:
         description = descriptions.get(device.description_id)
         if description is None:
             raise UsageError(reason=f"{device.slug}: no description '{device.description_id}'")
+        if description.bus is not Bus.CANOPEN:
+            raise UsageError(reason=f"{device.slug}: {description.id} is no device of a CAN bus")
         return Target(device, description, self.live)
 
     def _by_node(self, bus: str) -> dict[int, Description]:
@@ -162,7 +172,7 @@ class Connection:
             was_up = before is not None and before.state in (LinkState.CONNECTED, LinkState.LISTENING)
             if status.state is LinkState.CONNECTED and before is None:
                 self.journal.note(Kind.CONNECTED, None, bus=name, adapter=link.adapter)
-            elif status.state is LinkState.LOST and was_up:
+            elif status.state is LinkState.LOST and (was_up or before is None):
                 link.gap(now_ns)
                 self.journal.note(Kind.BUS_LOST, None, bus=name, reason=status.reason)
             elif before is not None and status.reconnects > before.reconnects:

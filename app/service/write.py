@@ -17,7 +17,11 @@ from app.service.journal import Journal, Kind
 
 @dataclass(frozen=True, slots=True)
 class WriteResult:
-    """What happened to one object. ``read`` is None where the description proves a write by other means."""
+    """What happened to one object.
+
+    ``read`` is what was read back; None where the description proves a write by other means. ``verified`` is False
+    where only an effect would prove it, which is not looked for here.
+    """
 
     address: Address
     was: Raw | None
@@ -69,7 +73,7 @@ async def write_raw(
         journal.note(Kind.WRITE_FAILED, target.slug, **shown, reason=error.code, now=_shown(target, entry, raw))
         raise
     journal.note(Kind.WRITTEN, target.slug, **shown, now=_shown(target, entry, raw))
-    return WriteResult(address, was, raw, read, read is not None, how)
+    return WriteResult(address, was, raw, read, read is not None or entry.verify is Verify.ACK, how)
 
 
 async def _know_what_it_rests_on(driver: Driver, target: Target, entry: Entry) -> None:

@@ -26,14 +26,16 @@ def test_the_example_is_a_turbine_of_three_blades() -> None:
     ("old", "new", "key"),
     [
         ("schema = 1", "schema = 9", "schema"),
+        ("bitrate = 500000", "bitrate = 500000\nfoo = 1", "turbine.wtg-07.bus.can0.foo"),
+        ("blade = 1", "blad = 1", "turbine.wtg-07.station.blade-1.blad"),
         ("node = 11", "node = 12", "wtg-07/blade-2/pmc.node"),
         ("node = 11", "node = 0", "turbine.wtg-07.station.blade-1.device.pmc.node"),
         ("node = 11", 'node = "11"', "turbine.wtg-07.station.blade-1.device.pmc.node"),
         ("blade = 1", "blade = 4", "turbine.wtg-07.station.blade-1.blade"),
-        ("bitrate = 500000", "bitrate = true", "turbine.wtg-07.bitrate"),
+        ("bitrate = 500000", "bitrate = true", "turbine.wtg-07.bus.can0.bitrate"),
         ('description = "oat-pmm", node = 1 ', "node = 1 ", "turbine.wtg-07.station.blade-1.device.pmm.description"),
         ("[turbine.wtg-07.station.blade-1]", "[turbine.wtg-07.station.Blade_1]", "turbine.wtg-07.station.Blade_1"),
-        ("[turbine.wtg-07.bus.can0]", "[turbine.wtg-07.bus.", ""),
+        ("[turbine.wtg-07.bus.can0]", "[turbine.wtg-07.bus.", "*"),
     ],
 )
 def test_a_wrong_site_names_the_place(tmp_path: Path, old: str, new: str, key: str) -> None:
