@@ -6,44 +6,32 @@ import argparse
 import asyncio
 import contextlib
 import signal
-import sys
 import time
-from collections.abc import AsyncIterator, Callable, Coroutine, Mapping
-from contextlib import asynccontextmanager
+from collections.abc import Callable, Coroutine, Mapping
 from typing import Any
 
 from app.cli.arguments import seconds
-from app.cli.output import Output, error_text, tell_warning
-from app.cli.runtime import spare_collector
+from app.cli.connecting import connected, find_nodes, make_connection, run_command, sheets_of
+from app.cli.output import Output, error_text
 from app.cli.targets import (
-    Sheets,
     add_connection,
     bare_turbine,
     description_id,
-    descriptions_for,
     find_device,
-    scanned_turbine,
     site_turbine,
 )
 from app.drivers.contract import FoundNode
-from app.errors import HubsideError, NoAnswerError, RecordingError, UnverifiedError, UsageError
-from app.model.address import Address, is_decimal, parse_address
+from app.errors import HubsideError, RecordingError, UnverifiedError, UsageError
+from app.model.address import Address, parse_address
 from app.model.checks import Allow, check_read
 from app.model.datatypes import Raw
 from app.model.description import Entry
-from app.model.site import Turbine
 from app.model.values import show, to_scaled
 from app.service.backup import ReadReport, read_device, read_devices, readable, to_set, write_set
 from app.service.connection import Connection
 from app.service.devices import Target
-from app.service.options import Options
 from app.service.save import restart, save
 from app.service.write import WriteResult, write_text
-
-TERMINATED = 143
-"""Exit code after SIGTERM, as shells have it."""
-SWITCH_INTERVAL_S = 0.0005
-"""The receive thread gets its turn sooner than Python's 5 ms, so that a request follows an answer at once."""
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -52,7 +40,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     def command(name: str, run: Callable[..., Coroutine[Any, Any, int]], text: str) -> argparse.ArgumentParser:
         parser = commands.add_parser(name, help=text)
         add_connection(parser)
-        parser.set_defaults(run=lambda arguments, output: _run(run(arguments, output)))
+        parser.set_defaults(run=lambda arguments, output: run_command(run(arguments, output)))
         return parser
 
     command("scan", _scan, "find and identify the devices of a bus")
@@ -78,87 +66,10 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     record.add_argument("--seconds", type=seconds, help="end by itself after so long")
 
 
-def _run(command: Coroutine[Any, Any, int]) -> int:
-    sys.setswitchinterval(SWITCH_INTERVAL_S)
-    return asyncio.run(_until_terminated(command))
-
-
-async def _until_terminated(command: Coroutine[Any, Any, int]) -> int:
-    """SIGTERM ends a command as Ctrl-C does: the bus and the recording are closed."""
-    task = asyncio.ensure_future(command)
-    with contextlib.suppress(NotImplementedError):  # Windows has no such handlers
-        asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, task.cancel)
-    try:
-        return await task
-    except asyncio.CancelledError:
-        return TERMINATED
-
-
-@asynccontextmanager
-async def connected(
-    arguments: argparse.Namespace, output: Output, record: bool | None = None
-) -> AsyncIterator[Connection]:
-    """The connection that the arguments name; on a bare bus the devices are found by a scan first."""
-    turbine = site_turbine(arguments)
-    sheets = _sheets(arguments, output)
-    if turbine is None:
-        nodes = _named_nodes(arguments)
-        found = await _find(arguments, output, sheets, nodes)
-        turbine = scanned_turbine(arguments.can, sheets, found)
-        _all_there(nodes, found, turbine)
-    connection = _connection(arguments, turbine, sheets, arguments.record if record is None else record)
-    spare_collector()
-    async with connection:
-        yield connection
-
-
-def _sheets(arguments: argparse.Namespace, output: Output) -> Sheets:
-    return Sheets(arguments.eds, lambda path, warning: tell_warning(output, path, warning))
-
-
-def _connection(arguments: argparse.Namespace, turbine: Turbine, sheets: Sheets, record: bool) -> Connection:
-    settings = arguments.settings
-    if record:
-        settings.recordings.mkdir(parents=True, exist_ok=True)
-    options = Options(
-        person=settings.person,
-        recordings=settings.recordings if record else None,
-        consent=arguments.consent,
-        listen_s=arguments.listen_s,
-    )
-    return Connection(turbine, descriptions_for(sheets, turbine, arguments.site), options)
-
-
-def _all_there(nodes: list[int] | None, found: list[FoundNode], turbine: Turbine) -> None:
-    """Raises NoAnswerError for a node that is not there, UsageError for one that nothing describes."""
-    for node in nodes or ():
-        if all(one.node != node for one in found):
-            raise NoAnswerError(node=node, address="1000", timeout_s=1)
-        if turbine.device(str(node)) is None:
-            raise UsageError(reason=f"nothing describes the device at node {node}; name its EDS file with --eds")
-
-
-def _named_nodes(arguments: argparse.Namespace) -> list[int] | None:
-    """The node numbers that the command names: nobody else need be asked. None where it names none."""
-    named = getattr(arguments, "target", [])
-    texts = [named] if isinstance(named, str) else named
-    return [int(text) for text in texts if is_decimal(text) and 1 <= int(text) <= 127] or None
-
-
-async def _find(
-    arguments: argparse.Namespace, output: Output, sheets: Sheets, nodes: list[int] | None = None
-) -> list[FoundNode]:
-    turbine = site_turbine(arguments) or bare_turbine(arguments.can)
-    output.say("cli.listening", bus=", ".join(bus.connection for bus in turbine.buses))
-    async with _connection(arguments, turbine, sheets, False) as connection:
-        found = [await link.driver.scan(nodes) for link in connection.buses.values()]
-    return [node for on_bus in found for node in on_bus]
-
-
 async def _scan(arguments: argparse.Namespace, output: Output) -> int:
     started = time.monotonic()
-    sheets = _sheets(arguments, output)
-    found = await _find(arguments, output, sheets)
+    sheets = sheets_of(arguments, output)
+    found = await find_nodes(arguments, output, sheets)
     if output.as_json:
         output.result([_found_dict(node, description_id(sheets, node)) for node in found], "")
     elif found:
@@ -374,7 +285,7 @@ async def _record(arguments: argparse.Namespace, output: Output) -> int:
     for number in (signal.SIGINT, signal.SIGTERM):
         with contextlib.suppress(NotImplementedError):  # Windows: Ctrl-C comes as KeyboardInterrupt
             loop.add_signal_handler(number, stop.set)
-    connection = _connection(arguments, turbine, _sheets(arguments, output), True)
+    connection = make_connection(arguments, turbine, sheets_of(arguments, output), True)
     async with connection:
         output.say("cli.stop_hint")
         with contextlib.suppress(TimeoutError):

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from app.cli.arguments import milliseconds, port
-from app.cli.bus import SWITCH_INTERVAL_S, connected
+from app.cli.connecting import SWITCH_INTERVAL_S, connected
 from app.cli.output import Output
 from app.cli.targets import add_connection
 from app.errors import BusLostError, BusOpenError

@@ -1,0 +1,108 @@
+"""From arguments to a connection: which bus, which devices, and how a command is run and ended."""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import contextlib
+import signal
+import sys
+from collections.abc import AsyncIterator, Coroutine
+from contextlib import asynccontextmanager
+from typing import Any
+
+from app.cli.output import Output, tell_warning
+from app.cli.runtime import spare_collector
+from app.cli.targets import Sheets, bare_turbine, descriptions_for, scanned_turbine, site_turbine
+from app.drivers.contract import FoundNode
+from app.errors import NoAnswerError, UsageError
+from app.model.address import is_decimal
+from app.model.site import Turbine
+from app.service.connection import Connection
+from app.service.options import Options
+
+TERMINATED = 143
+"""Exit code after SIGTERM, as shells have it."""
+SWITCH_INTERVAL_S = 0.0005
+"""The receive thread gets its turn sooner than Python's 5 ms, so that a request follows an answer at once."""
+
+
+def run_command(command: Coroutine[Any, Any, int]) -> int:
+    """Run a command in an event loop; gives its exit code."""
+    sys.setswitchinterval(SWITCH_INTERVAL_S)
+    return asyncio.run(_until_terminated(command))
+
+
+async def _until_terminated(command: Coroutine[Any, Any, int]) -> int:
+    """SIGTERM ends a command as Ctrl-C does: the bus and the recording are closed."""
+    task = asyncio.ensure_future(command)
+    with contextlib.suppress(NotImplementedError):  # Windows has no such handlers
+        asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, task.cancel)
+    try:
+        return await task
+    except asyncio.CancelledError:
+        return TERMINATED
+
+
+@asynccontextmanager
+async def connected(
+    arguments: argparse.Namespace, output: Output, record: bool | None = None
+) -> AsyncIterator[Connection]:
+    """The connection that the arguments name; on a bare bus the devices are found by a scan first."""
+    turbine = site_turbine(arguments)
+    sheets = sheets_of(arguments, output)
+    if turbine is None:
+        nodes = _named_nodes(arguments)
+        found = await find_nodes(arguments, output, sheets, nodes)
+        turbine = scanned_turbine(arguments.can, sheets, found)
+        _all_there(nodes, found, turbine)
+    connection = make_connection(arguments, turbine, sheets, arguments.record if record is None else record)
+    spare_collector()
+    async with connection:
+        yield connection
+
+
+def sheets_of(arguments: argparse.Namespace, output: Output) -> Sheets:
+    """The EDS files of the command line; their warnings are told. Raises DescriptionError."""
+    return Sheets(arguments.eds, lambda path, warning: tell_warning(output, path, warning))
+
+
+def make_connection(arguments: argparse.Namespace, turbine: Turbine, sheets: Sheets, record: bool) -> Connection:
+    """A connection that is not open yet. Raises OSError where nothing can be recorded in the data folder."""
+    settings = arguments.settings
+    if record:
+        settings.recordings.mkdir(parents=True, exist_ok=True)
+    options = Options(
+        person=settings.person,
+        recordings=settings.recordings if record else None,
+        consent=arguments.consent,
+        listen_s=arguments.listen_s,
+    )
+    return Connection(turbine, descriptions_for(sheets, turbine, arguments.site), options)
+
+
+def _all_there(nodes: list[int] | None, found: list[FoundNode], turbine: Turbine) -> None:
+    """Raises NoAnswerError for a node that is not there, UsageError for one that nothing describes."""
+    for node in nodes or ():
+        if all(one.node != node for one in found):
+            raise NoAnswerError(node=node, address="1000", timeout_s=1)
+        if turbine.device(str(node)) is None:
+            raise UsageError(reason=f"nothing describes the device at node {node}; name its EDS file with --eds")
+
+
+def _named_nodes(arguments: argparse.Namespace) -> list[int] | None:
+    """The node numbers that the command names: nobody else need be asked. None where it names none."""
+    named = getattr(arguments, "target", [])
+    texts = [named] if isinstance(named, str) else named
+    return [int(text) for text in texts if is_decimal(text) and 1 <= int(text) <= 127] or None
+
+
+async def find_nodes(
+    arguments: argparse.Namespace, output: Output, sheets: Sheets, nodes: list[int] | None = None
+) -> list[FoundNode]:
+    """Scan; only ``nodes`` where given."""
+    turbine = site_turbine(arguments) or bare_turbine(arguments.can)
+    output.say("cli.listening", bus=", ".join(bus.connection for bus in turbine.buses))
+    async with make_connection(arguments, turbine, sheets, False) as connection:
+        found = [await link.driver.scan(nodes) for link in connection.buses.values()]
+    return [node for on_bus in found for node in on_bus]
