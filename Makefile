@@ -20,7 +20,7 @@ check: $(VENV)/.ready frontend/node_modules/.ready
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
-	$(PY) -m pytest tests/test_layers.py tests/test_generated.py
+	$(PY) -m pytest tests/test_layers.py tests/test_generated.py tests/model/test_eds_write.py tests/model/test_texts.py
 	cd frontend && npm run --silent check
 
 bench: setup
