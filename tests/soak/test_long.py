@@ -1,4 +1,4 @@
-"""The long figures, run by ``make soak``: hours at work, hundreds of kills. ``HUBSIDE_SOAK_S`` is the hours in seconds."""
+"""The long figures, run by ``make soak``: hours at work (``HUBSIDE_SOAK_S``, in seconds) and hundreds of kills."""
 
 from __future__ import annotations
 
