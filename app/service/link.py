@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Final, Literal, Protocol
 
-from app.drivers.contract import DriverStatus, LinkState
+from app.drivers.contract import TWIN_NAME, DriverStatus, LinkState
+from app.model.address import Address
 from app.recording.writer import RecorderState, RecorderStatus
+from app.service.devices import Target
+
+DEVICE_NAME: Final = Address(0x1008)
 
 Mode = Literal["live", "twin", "none"]
 LinkName = Literal["connected", "lost", "disconnected"]
@@ -82,6 +86,33 @@ class LinkLine:
     dropped: int
     recording: RecordingLine
     other_masters: tuple[MasterLine, ...]
+
+
+class TwinWatch:
+    """Whether all devices of a connection are simulated, by what they say themselves. For one thread.
+
+    A restart makes a device's name unknown until somebody reads it again; until then what it said last is held. It is
+    not held over a gap, nor from one connection to the next: another bus may be connected since.
+    """
+
+    def __init__(self, targets: Iterable[Target], buses: Mapping[str, Bus]) -> None:
+        self._targets = tuple(targets)
+        self._buses = buses
+        self._said: dict[str, tuple[bool, int]] = {}
+
+    def all_twins(self) -> bool:
+        """True where each device says, or said last, that it is simulated. To be asked a few times a second."""
+        statuses = {name: bus.status for name, bus in self._buses.items()}
+        answers = [self._is_twin(target, statuses[target.device.bus]) for target in self._targets]
+        return bool(answers) and all(answers)
+
+    def _is_twin(self, target: Target, status: DriverStatus) -> bool:
+        view = target.live.value(target.device.bus, target.node, DEVICE_NAME)
+        if view is not None and view.stale:
+            self._said.pop(target.slug, None)
+        elif view is not None and view.reading is not None:
+            self._said[target.slug] = view.reading.data.startswith(TWIN_NAME.encode()), status.reconnects
+        return self._said.get(target.slug) == (True, status.reconnects)
 
 
 def link_line(buses: Mapping[str, Bus], recording: RecorderStatus | None, twins: bool, now_ns: int) -> LinkLine:

@@ -9,10 +9,11 @@ import asyncio
 import logging
 from typing import Final
 
-from app.errors import BusLostError, ConsentError, HubsideError, NoAnswerError
+from app.errors import HubsideError, SdoAbortError
 from app.model.address import Address, parse_address
 from app.service.connection import Connection
 from app.service.devices import Target
+from app.service.link import DEVICE_NAME
 from app.wire.nmt import NmtState
 from app.wire.records import Source
 
@@ -26,7 +27,9 @@ LOAD_CAP: Final = 0.6
 OTHER_CLIENT_NS: Final = 3_000_000_000
 """So long after another SDO client's last transfer with a node nothing is polled there."""
 BACK_OFF_S: Final = 3.0
-"""A node that does not answer is left alone for so long."""
+"""A node that does not answer is left alone for so long, or until it starts anew."""
+PDO_QUIET_NS: Final = 800_000_000
+"""A PDO that brought nothing for so long is not active: what it carries is polled before it counts as old."""
 
 FAST: Final = tuple(map(parse_address, ("6041", "6064", "606C", "3000", "3060")))
 SLOW: Final = tuple(
@@ -49,33 +52,57 @@ class Poller:
         """End polling."""
         for task in self._tasks:
             task.cancel()
-        await asyncio.gather(*self._tasks, return_exceptions=True)
+        for target, end in zip(
+            self._connection.targets, await asyncio.gather(*self._tasks, return_exceptions=True), strict=True
+        ):
+            if isinstance(end, Exception):
+                log.error("polling %s had ended by a defect", target.slug, exc_info=end)
 
     async def _poll(self, target: Target) -> None:
         fast = [address for address in FAST if address in target.description.entries]
         slow = [address for address in SLOW if address in target.description.entries]
         loop = asyncio.get_running_loop()
+        nameless: int | None = None
         turn = 0
         due = loop.time()
         while True:
-            wanted = [*fast, *slow] if turn % SLOW_EVERY == 0 else fast
             if self._allowed(target):
-                await self._read(target, self._not_in_pdos(target, wanted))
+                wanted = self._not_in_pdos(target, [*fast, *slow] if turn % SLOW_EVERY == 0 else fast)
+                boots, _ = self._era(target)
+                if boots != nameless and self._must_be_named(target):
+                    wanted.insert(0, DEVICE_NAME)
+                if isinstance((await self._read(target, wanted)).get(DEVICE_NAME), SdoAbortError):
+                    nameless = boots
             turn += 1
             due = max(due + self._period_s, loop.time())
             await asyncio.sleep(due - loop.time())
 
-    async def _read(self, target: Target, wanted: list[Address]) -> None:
+    async def _read(self, target: Target, wanted: list[Address]) -> dict[Address, bytes | HubsideError]:
+        """The answers; where there is none, only after a while."""
         if not wanted:
-            return
+            return {}
+        era = self._era(target)
+        answers: dict[Address, bytes | HubsideError] = {}
         try:
             answers = await self._connection.driver(target).read_many(target.node, wanted)
-        except (BusLostError, ConsentError, NoAnswerError) as error:
+        except HubsideError as error:
             log.debug("polling %s: %s", target.slug, error.code)
-            await asyncio.sleep(BACK_OFF_S)
-            return
         if all(isinstance(answer, HubsideError) for answer in answers.values()):
-            await asyncio.sleep(BACK_OFF_S)
+            await self._back_off(target, era)
+        return answers
+
+    async def _back_off(self, target: Target, era: tuple[int, int]) -> None:
+        """Leave the node alone, but not longer than until it starts anew or the link is back."""
+        loop = asyncio.get_running_loop()
+        until = loop.time() + BACK_OFF_S
+        while loop.time() < until and self._era(target) == era:  # noqa: ASYNC110  the live state has no event for it
+            await asyncio.sleep(self._period_s)
+
+    def _era(self, target: Target) -> tuple[int, int]:
+        """Changes where another device may stand at the node: with each boot-up and each connection."""
+        link = self._connection.buses[target.device.bus]
+        view = self._connection.live.node(link.name, target.node)
+        return (0 if view is None else view.boots), link.status.reconnects
 
     def _allowed(self, target: Target) -> bool:
         """True while the bus has room and nobody else talks to the device."""
@@ -87,12 +114,25 @@ class Poller:
         return alone and link.bus_load(now_ns) < LOAD_CAP
 
     def _not_in_pdos(self, target: Target, wanted: list[Address]) -> list[Address]:
-        """Without what a PDO brings by itself while the node is operational."""
+        """A new list, without what a PDO brings by itself while the node is operational."""
         view = self._connection.live.node(target.device.bus, target.node)
         if view is None or view.state is not NmtState.OPERATIONAL:
-            return wanted
+            return list(wanted)
         routes = self._connection.buses[target.device.bus].pdos(target.node)
         carried = {
             address for route in routes if route.source is Source.PDO_TX for address, _bits in route.mapping.entries
         }
-        return [address for address in wanted if address not in carried]
+        return [address for address in wanted if address not in carried or not self._came_by_pdo(target, address)]
+
+    def _must_be_named(self, target: Target) -> bool:
+        """Nobody has read the device's name since it started, or frames were lost since: another may stand there."""
+        if DEVICE_NAME not in target.description.entries:
+            return False
+        value = self._connection.live.value(target.device.bus, target.node, DEVICE_NAME)
+        return value is None or value.reading is None or value.stale
+
+    def _came_by_pdo(self, target: Target, address: Address) -> bool:
+        value = self._connection.live.value(target.device.bus, target.node, address)
+        if value is None or value.reading is None or value.reading.source is not Source.PDO_TX:
+            return False
+        return self._connection.stamper() - value.reading.t_ns < PDO_QUIET_NS

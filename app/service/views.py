@@ -9,7 +9,6 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final, Literal
 
-from app.drivers.contract import TWIN_NAME
 from app.errors import ValueTypeError
 from app.model.address import Address
 from app.model.datatypes import DataType, Raw
@@ -18,14 +17,14 @@ from app.model.site import Station, Turbine
 from app.model.values import to_scaled
 from app.service.devices import Target, decode
 from app.service.journal import Entry as JournalEntry
-from app.wire.events import Event
+from app.wire.events import Event, EventKind
 from app.wire.live import LiveState, NodeView, ValueView
 from app.wire.nmt import NmtState
-from app.wire.records import Source
+from app.wire.records import SdoAccess, Source
+from app.wire.sdo import Abort
 
 STALE_NS: Final = 1_000_000_000
 """A position older than this is no longer the present one."""
-DEVICE_NAME: Final = Address(0x1008)
 STATUSWORD: Final = Address(0x6041)
 ERROR_CODE: Final = Address(0x603F)
 _POSITION: Final = (Address(0x6064), Address(0x5064))
@@ -172,12 +171,6 @@ def device_state(target: Target) -> str | None:
         return axis_state(status)
     view = target.live.node(target.device.bus, target.node)
     return None if view is None or view.state is None else view.state.text_key
-
-
-def all_twins(targets: Iterable[Target]) -> bool:
-    """True where every device has said that it is simulated."""
-    names = [target.lookup(DEVICE_NAME) for target in targets]
-    return bool(names) and all(isinstance(name, str) and name.startswith(TWIN_NAME) for name in names)
 
 
 # -- axes --------------------------------------------------------------------------
@@ -341,13 +334,23 @@ def raw_from_json(entry: Entry, raw: RawJson) -> Raw:
 # -- events ------------------------------------------------------------------------
 
 
+def is_told(event: Event) -> bool:
+    """False for a read of what is empty (an error history without errors): a complete read has dozens of them."""
+    access, code = event.details.get("access"), event.details.get("abort_code")
+    return not (event.kind is EventKind.SDO_ABORTED and access == SdoAccess.READ.value and code == Abort.NO_DATA)
+
+
 def event_of_wire(event: Event, slugs: Mapping[tuple[str, int], str]) -> EventLine:
-    """An event that the decoder saw; ``slugs`` by bus and node."""
+    """An event that the decoder saw; ``slugs`` by bus and node.
+
+    A late answer is no more than information: a slow machine gives many, and none of them was taken for another.
+    """
     details = dict(event.details) | ({"repeats": event.repeats} if event.repeats else {})
     device = slugs.get((event.bus, event.node))
     if device is None and event.node:
         details["node"] = event.node
-    return EventLine(event.t_ns, event.severity.value, device, event.text_key, details)
+    severity: SeverityName = "info" if event.kind is EventKind.ORPHAN else event.severity.value
+    return EventLine(event.t_ns, severity, device, event.text_key, details)
 
 
 def event_of_journal(entry: JournalEntry) -> EventLine:

@@ -14,6 +14,7 @@ from app.model.texts import load_texts
 from app.scene.hub import HubScene
 from app.service.connection import Connection
 from app.service.jobs import Jobs
+from app.service.link import TwinWatch
 from app.service.scene_feed import run_scene
 from app.web import problem
 from app.web.access import Access
@@ -39,7 +40,7 @@ def create_app(
 
     @app.websocket("/api/ws")
     async def socket(websocket: WebSocket) -> None:
-        await serve_client(websocket, bench, time.monotonic)
+        await serve_client(websocket, bench, app.state.twins, time.monotonic)
 
     if scene is not None:
         app.include_router(viser_router(scene))
@@ -74,6 +75,7 @@ def create_api(bench: Connection | None, scene: HubScene | None = None, language
         generate_unique_id_function=lambda route: route.name,
     )
     app.state.bench = bench
+    app.state.twins = None if bench is None else TwinWatch(bench.targets, bench.buses)
     app.state.language = language
     app.include_router(router)
     problem.install(app)

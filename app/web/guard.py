@@ -5,10 +5,12 @@
 3. A request that another site's page makes (Sec-Fetch-Site) is refused, but for opening the page itself.
 4. A session by cookie; ``/?token=...`` opens one and is the only thing that works without.
 5. A body is JSON and says so: a form or text/plain needs no preflight, so a foreign page could send it.
+6. A body is small: a larger one is refused unread, or as soon as it turns out to be larger than it said.
 """
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Awaitable, Callable, MutableMapping
 from html import escape
 from typing import Any, Final
@@ -20,6 +22,7 @@ from app.web.problem import (
     MEDIA_TYPE,
     ForbiddenHostError,
     InvalidRequestError,
+    TooLargeError,
     UnauthorisedError,
     problem_of,
 )
@@ -33,6 +36,8 @@ Headers = list[tuple[bytes, bytes]]
 
 LOOPBACK_NAMES: Final = ("127.0.0.1", "localhost", "[::1]")
 VISER_PATH: Final = "/viser"
+MAX_BODY: Final = 65_536
+"""Of a request, in bytes: the longest list of addresses and the longest value fit."""
 _WITH_BODY: Final = ("POST", "PUT", "PATCH")
 _FOREIGN: Final = ("cross-site", "same-site")
 _COMMON: Final = "default-src 'self'; base-uri 'none'; form-action 'none'; object-src 'none'"
@@ -81,6 +86,9 @@ class Guard:
             return ForbiddenHostError(host=host, origin=headers["sec-fetch-site"])
         if method in _WITH_BODY and _media_type(headers) != "application/json":
             return InvalidRequestError(reason=f"Content-Type '{_media_type(headers)}' is not application/json")
+        length = headers.get("content-length", "")
+        if length.isdecimal() and int(length) > MAX_BODY:
+            return _too_large()
         return None
 
     def _has_session(self, headers: dict[str, str]) -> bool:
@@ -112,7 +120,42 @@ class Guard:
                 message = {**message, "headers": [*message.get("headers", []), *added]}
             await send(message)
 
-        await self._app(scope, receive, secured)
+        if scope.get("method") not in _WITH_BODY:
+            await self._app(scope, receive, secured)
+            return
+        body = await _body(receive)
+        if body is None:
+            await _refuse(scope, headers, send, _too_large())
+        else:
+            await self._app(scope, _given(body, receive), secured)
+
+
+async def _body(receive: Receive) -> list[Message] | None:
+    """A request's messages up to the end of its body, or until it is gone; None where the body is too large."""
+    messages: list[Message] = []
+    size = 0
+    while True:
+        message = await receive()
+        messages.append(message)
+        size += len(message.get("body", b""))
+        if size > MAX_BODY:
+            return None
+        if not message.get("more_body", False):
+            return messages
+
+
+def _given(messages: list[Message], receive: Receive) -> Receive:
+    """``receive`` that gives ``messages`` first."""
+    waiting = deque(messages)
+
+    async def next_one() -> Message:
+        return waiting.popleft() if waiting else await receive()
+
+    return next_one
+
+
+def _too_large() -> TooLargeError:
+    return TooLargeError(reason=f"the body is larger than {MAX_BODY} bytes")
 
 
 def security_headers(path: str, host: str) -> Headers:

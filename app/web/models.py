@@ -73,7 +73,7 @@ class Turbine(BaseModel):
 class ReadRequest(BaseModel):
     """``addresses`` null reads all readable objects."""
 
-    addresses: Annotated[list[str], Field(max_length=10_000)] | None = None
+    addresses: Annotated[list[str], Field(max_length=5_000)] | None = None
 
 
 class WriteRequest(BaseModel):
@@ -82,7 +82,7 @@ class WriteRequest(BaseModel):
     model_config = ConfigDict(extra="forbid")
 
     address: str
-    raw: StrictInt | StrictFloat | Annotated[StrictStr, Field(max_length=65_536)]
+    raw: StrictInt | StrictFloat | Annotated[StrictStr, Field(max_length=60_000)]
 
 
 class Nothing(BaseModel):

@@ -62,6 +62,10 @@ class InvalidRequestError(errors.RefusedError):
     code: ClassVar[str] = "invalid"
 
 
+class TooLargeError(InvalidRequestError):
+    """The request's body is larger than any that is understood. Details: reason."""
+
+
 class SceneGoneError(errors.NoAnswerError):
     """The 3D server does not answer. Details: reason."""
 
@@ -73,6 +77,7 @@ _OWN_STATUS: Final[Mapping[type[HubsideError], HTTPStatus]] = {
     UnauthorisedError: HTTPStatus.UNAUTHORIZED,
     ForbiddenHostError: HTTPStatus.FORBIDDEN,
     InvalidRequestError: HTTPStatus.UNPROCESSABLE_ENTITY,
+    TooLargeError: HTTPStatus.REQUEST_ENTITY_TOO_LARGE,
     SceneGoneError: HTTPStatus.BAD_GATEWAY,
 }
 

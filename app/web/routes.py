@@ -15,6 +15,7 @@ from app.service.backup import read_device, readable
 from app.service.connection import Connection
 from app.service.devices import Target
 from app.service.jobs import Job, Jobs
+from app.service.link import TwinWatch
 from app.service.save import restart, save
 from app.service.stop import AxisOutcome, Command, command_all
 from app.service.views import device_state, raw_from_json, raw_to_json
@@ -53,6 +54,12 @@ def get_bench(request: Request) -> Connection:
     return bench
 
 
+def get_twins(request: Request) -> TwinWatch:
+    """What is known of whether the devices are simulated."""
+    twins: TwinWatch = request.app.state.twins
+    return twins
+
+
 def get_jobs(request: Request) -> Jobs:
     """The jobs of this server."""
     jobs: Jobs = request.app.state.jobs
@@ -70,6 +77,7 @@ def get_target(request: Request, turbine: str, station: str, device: str) -> Tar
 
 
 BenchOf = Annotated[Connection, Depends(get_bench)]
+TwinsOf = Annotated[TwinWatch, Depends(get_twins)]
 JobsOf = Annotated[Jobs, Depends(get_jobs)]
 TargetOf = Annotated[Target, Depends(get_target)]
 DEVICE = "/live/devices/{turbine}/{station}/{device}"
@@ -94,10 +102,10 @@ async def texts(locale: Language) -> dict[str, str]:
 
 
 @router.get("/live/turbine")
-async def turbine(bench: BenchOf) -> Turbine:
+async def turbine(bench: BenchOf, twins: TwinsOf) -> Turbine:
     """The connected turbine with its stations and devices."""
     site = bench.turbine
-    link = link_of(bench, bench.stamper())
+    link = link_of(bench, twins, bench.stamper())
     adapter = bench.buses[link.bus].adapter if link.bus else ""
     stations = [
         StationRef(

@@ -20,14 +20,14 @@ from app import __version__
 from app.service.connection import Connection
 from app.service.devices import Target
 from app.service.journal import Entry
-from app.service.link import LinkLine, link_line, link_urgent
+from app.service.link import LinkLine, TwinWatch, link_line, link_urgent
 from app.service.views import (
     AxisLine,
     EventLine,
-    all_twins,
     axis_lines,
     event_of_journal,
     event_of_wire,
+    is_told,
     node_lines,
     nodes_urgent,
     value_cells,
@@ -68,8 +68,9 @@ _adapter: Final[TypeAdapter[Any]] = TypeAdapter(ServerMessage)
 class Feed:
     """What one client is to be told. ``due`` gives the messages of this moment; for one thread."""
 
-    def __init__(self, bench: Connection) -> None:
+    def __init__(self, bench: Connection, twins: TwinWatch) -> None:
         self._bench = bench
+        self._twins = twins
         self._targets: Mapping[str, Target] = {target.slug: target for target in bench.targets}
         self._slugs = {(target.device.bus, target.node): slug for slug, target in self._targets.items()}
         self._topics: frozenset[str] = frozenset()
@@ -166,7 +167,7 @@ class Feed:
         if not self._passed("look at link", now_s, LINK_LOOK_S):
             return
         now_ns = self._bench.stamper()
-        line = link_of(self._bench, now_ns)
+        line = link_of(self._bench, self._twins, now_ns)
         changed = self._link is None or link_urgent(line) != link_urgent(self._link)
         if changed or self._passed("link", now_s, LINK_S):
             self._link = line
@@ -185,7 +186,7 @@ class Feed:
             lines.append(event_of_journal(self._journal.popleft()))
         if changes is not None:
             new = changes.events if "events" in self._fresh else [e for e in changes.events if e.version > self._since]
-            lines += [event_of_wire(event, self._slugs) for event in new]
+            lines += [event_of_wire(event, self._slugs) for event in new if is_told(event)]
         for line in sorted(lines, key=lambda line: line.t_ns)[-RECENT_EVENTS:]:
             yield EventMessage(seq=self._count(), t_ns=self._bench.stamper(), data=line)
 
@@ -201,16 +202,16 @@ class Feed:
         return self._seq
 
 
-def link_of(bench: Connection, now_ns: int) -> LinkLine:
+def link_of(bench: Connection, twins: TwinWatch, now_ns: int) -> LinkLine:
     """The state of the link now."""
     recording = None if bench.recording is None else bench.recording.status()
-    return link_line(bench.buses, recording, all_twins(bench.targets), now_ns)
+    return link_line(bench.buses, recording, twins.all_twins(), now_ns)
 
 
-async def serve_client(socket: WebSocket, bench: Connection, now_s: Callable[[], float]) -> None:
+async def serve_client(socket: WebSocket, bench: Connection, twins: TwinWatch, now_s: Callable[[], float]) -> None:
     """Serve one page until it goes away. The guard has let it in."""
     await socket.accept()
-    feed = Feed(bench)
+    feed = Feed(bench, twins)
     tasks = [asyncio.create_task(_tell(socket, feed, now_s)), asyncio.create_task(_listen(socket, feed))]
     try:
         done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
@@ -245,7 +246,14 @@ async def _send(socket: WebSocket, message: ServerMessage) -> None:
 
 async def _listen(socket: WebSocket, feed: Feed) -> None:
     while True:
-        text = await socket.receive_text()
+        message = await socket.receive()
+        if message["type"] == "websocket.disconnect":
+            raise WebSocketDisconnect(message.get("code", 1005))
+        text = message.get("text")
+        if text is None:
+            log.warning("a page sent bytes, where only text is understood")
+            await socket.close(1003, "text only")
+            return
         if len(text) > MAX_REQUEST:
             await socket.close(1009)
             return

@@ -29,6 +29,16 @@ class Served:
     thread: LineThread
     turbine: Turbine
     address: str
+    server: SocketcandServer
+
+    def cut(self) -> None:
+        """End every client's connection, as a cable does that is pulled; it may connect again at once."""
+
+        def close_all() -> None:
+            for client in tuple(self.server._clients):
+                client.close("cut")
+
+        self.thread.call_soon(close_all)
 
     def spoil(self, fault: Fault) -> None:
         """Have one coming frame dropped, delayed or doubled."""
@@ -44,7 +54,7 @@ def served() -> Iterator[Served]:
     )
     turbine.power_on(line.now_ns)
     with LineThread(line) as thread, SocketcandServer(thread) as server:
-        yield Served(line, thread, turbine, f"socketcand:127.0.0.1:{server.port}")
+        yield Served(line, thread, turbine, f"socketcand:127.0.0.1:{server.port}", server)
     assert thread.handler_errors == 0
 
 

@@ -13,11 +13,14 @@ from app.scene.hub import BladeState
 from app.service import views
 from app.service.connection import Connection
 from app.service.scene_feed import pose
+from app.wire import sdo
+from app.wire.events import EventKind
 from app.wire.nmt import NmtState
 from tests.web.rig import BUS, Feeder, make_bench
 
 PMC = "wtg-07/blade-1/pmc"
 PMM = "wtg-07/blade-1/pmm"
+STATUSWORD = Address(0x6041)
 SECOND_NS = 1_000_000_000
 
 
@@ -123,14 +126,27 @@ def test_a_silent_node_is_in_no_known_state(bench: Connection, feeder: Feeder) -
     assert (silent.nmt, silent.silent) == ("unknown", True)
 
 
-def test_the_twin_badge_needs_every_device_to_say_so(bench: Connection, feeder: Feeder) -> None:
-    nodes = [target.node for target in bench.targets]
-    for node in nodes:
-        assert not views.all_twins(bench.targets)
-        feeder.read(node, Address(0x1008), b"HUBSIDE TWIN PMC")
-    assert views.all_twins(bench.targets)
-    feeder.read(nodes[0], Address(0x1008), b"PMC")
-    assert not views.all_twins(bench.targets)
+def test_reads_of_what_is_empty_are_no_events_but_refused_writes_are(bench: Connection, feeder: Feeder) -> None:
+    history = Address(0x1003, 1)
+    for request, code in (
+        (sdo.upload_request(history), sdo.Abort.NO_DATA),
+        (sdo.upload_request(history), sdo.Abort.NO_SUB_INDEX),
+        (sdo.download_request(history, bytes(4)), sdo.Abort.NO_DATA),
+    ):
+        feeder.can(0x600 + 11, request)
+        feeder.can(0x580 + 11, sdo.abort(history, code))
+    told = [event.details for event in bench.live.events() if views.is_told(event)]
+    assert [(details["access"], details["abort_code"]) for details in told] == [
+        ("read", sdo.Abort.NO_SUB_INDEX),
+        ("write", sdo.Abort.NO_DATA),
+    ]
+
+
+def test_late_answers_are_information(bench: Connection, feeder: Feeder) -> None:
+    feeder.can(0x580 + 11, sdo.upload_response(STATUSWORD, bytes(2)))
+    (event,) = bench.live.events()
+    assert event.kind is EventKind.ORPHAN
+    assert views.event_of_wire(event, {}).severity == "info"
 
 
 def test_raw_values_survive_json(bench: Connection) -> None:

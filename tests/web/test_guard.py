@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import AsyncIterator
 
 import httpx
 import pytest
 
 from app.web.access import SESSION_S, Access
+from app.web.guard import MAX_BODY
 from app.web.serve import launch_url
-from tests.web.rig import Server, denied, running
+from tests.web.rig import DEADLINE_S, Server, denied, running
 
 API = "/api/session"
+WRITE = "/api/live/devices/wtg-07/blade-1/pmm/write"
 
 
 @pytest.fixture
@@ -124,6 +127,55 @@ async def test_a_body_that_needs_no_preflight_is_refused(server: Server, kind: s
     answer = await server.client.post(path, content=body, headers=headers)
     assert answer.status_code == 422
     assert answer.json()["code"] == "invalid"
+
+
+async def test_a_body_that_says_it_is_too_large_is_refused_unread(server: Server) -> None:
+    """Only the head is sent: the answer comes without the body."""
+    head = (
+        f"POST {WRITE} HTTP/1.1\r\nHost: 127.0.0.1:{server.port}\r\nCookie: {server.cookie}\r\n"
+        f"Content-Type: application/json\r\nContent-Length: {MAX_BODY + 1}\r\n\r\n"
+    )
+    reader, writer = await asyncio.open_connection("127.0.0.1", server.port)
+    try:
+        writer.write(head.encode())
+        answer = await asyncio.wait_for(reader.readuntil(b"\r\n\r\n"), DEADLINE_S)
+    finally:
+        writer.close()
+    assert answer.startswith(b"HTTP/1.1 413 ")
+    assert b"content-type: application/problem+json" in answer
+
+
+async def test_a_body_that_turns_out_too_large_is_refused_before_its_end(server: Server) -> None:
+    """It comes in chunks without a length, and never ends: the answer comes all the same."""
+    head = (
+        f"POST {WRITE} HTTP/1.1\r\nHost: 127.0.0.1:{server.port}\r\nCookie: {server.cookie}\r\n"
+        "Content-Type: application/json\r\nTransfer-Encoding: chunked\r\n\r\n"
+    )
+    reader, writer = await asyncio.open_connection("127.0.0.1", server.port)
+    try:
+        writer.write(head.encode())
+        for _ in range(MAX_BODY // 4096 + 1):
+            writer.write(b"1000\r\n" + b" " * 4096 + b"\r\n")
+            await writer.drain()
+        answer = await asyncio.wait_for(reader.readuntil(b"\r\n\r\n"), DEADLINE_S)
+    finally:
+        writer.close()
+    assert answer.startswith(b"HTTP/1.1 413 ")
+
+
+async def test_a_body_up_to_the_limit_is_read(server: Server) -> None:
+    body = b'{"address": "3110:01", "raw": "x"}'
+    headers = {"Content-Type": "application/json"}
+    for extra, status, code in ((0, 422, "value_type"), (1, 413, "invalid")):
+        padded = body + b" " * (MAX_BODY - len(body) + extra)
+        answer = await server.client.post(WRITE, content=padded, headers=headers)
+        assert (answer.status_code, answer.json()["code"]) == (status, code)
+
+    async def chunks() -> AsyncIterator[bytes]:
+        for at in range(0, len(body), 5):
+            yield body[at : at + 5]
+
+    assert (await server.client.post(WRITE, content=chunks(), headers=headers)).json()["code"] == "value_type"
 
 
 async def test_requests_of_other_sites_are_refused_but_links_open(server: Server) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import socket
 import struct
 import time
@@ -16,6 +17,7 @@ from app.model.address import Address
 from app.model.datatypes import DataType, encode_raw
 from app.service.journal import Kind
 from app.web.socket import HEARTBEAT_S
+from app.wire import sdo
 from tests.web.rig import DEADLINE_S, Page, Server, running, wait_until
 
 PMC_2 = "wtg-07/blade-2/pmc"
@@ -188,6 +190,42 @@ async def test_what_is_no_message_ends_the_connection(server: Server) -> None:
         assert closed.value.rcvd.code == 1008, text
     async with server.socket() as connection:
         await Page(connection).until("hello")
+
+
+async def test_bytes_end_the_connection_and_are_no_defect(server: Server, caplog: pytest.LogCaptureFixture) -> None:
+    for data in (b"", b'{"type":"subscribe","topics":[]}', bytes(70_000)):
+        async with server.socket() as connection:
+            await connection.send(data)
+            with pytest.raises(websockets.ConnectionClosed) as closed:
+                async with asyncio.timeout(DEADLINE_S):
+                    while True:
+                        await connection.recv()
+        assert closed.value.rcvd is not None
+        assert closed.value.rcvd.code == 1003
+    assert [record for record in caplog.records if record.levelno >= logging.ERROR] == []
+
+
+async def test_a_twin_that_restarts_stays_a_twin_on_the_page(server: Server, page: Page) -> None:
+    for target in server.bench.targets:
+        server.feeder.read(target.node, Address(0x1008), b"HUBSIDE TWIN")
+    await page.subscribe("link", "nodes")
+    assert (await page.until("link"))["data"]["mode"] == "twin"
+    server.feeder.heartbeat(12, 0)
+    await page.until("nodes", lambda data: data[3]["boots"] == 1)
+    for _ in range(2):
+        assert (await page.until("link"))["data"]["mode"] == "twin"
+    assert (await server.client.get("/api/live/turbine")).json()["mode"] == "twin"
+    server.feeder.read(12, Address(0x1008), b"PMC")
+    await page.until("link", lambda data: data["mode"] == "live")
+
+
+async def test_an_empty_error_history_is_no_event(server: Server, page: Page) -> None:
+    for address, code in ((Address(0x1003, 1), sdo.Abort.NO_DATA), (Address(0x4711), sdo.Abort.NO_OBJECT)):
+        server.feeder.can(0x600 + 12, sdo.upload_request(address))
+        server.feeder.can(0x580 + 12, sdo.abort(address, code))
+    await page.subscribe("events")
+    told = (await page.until("event"))["data"]
+    assert (told["text_key"], told["details"]["address"]) == ("event.sdo_aborted", "4711")
 
 
 async def test_a_change_reaches_the_page_quickly(server: Server, page: Page) -> None:
