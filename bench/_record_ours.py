@@ -10,7 +10,7 @@ import json
 import sys
 from pathlib import Path
 
-from app.cli.bus import SWITCH_INTERVAL_S
+from app.cli.connecting import SWITCH_INTERVAL_S
 from app.cli.runtime import spare_collector
 from app.model.description_file import BUILTIN, load_builtin
 from app.model.site import load_site
