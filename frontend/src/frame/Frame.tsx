@@ -13,7 +13,8 @@ import { useEscapeStops } from "./stop";
 /** The frame of every page: who we are connected to above, rooms left, 3D right, events below. */
 export function Frame() {
   const deaf = useHearing().state !== "hearing";
-  const mode = useLink()?.mode ?? "none";
+  const link = useLink();
+  const mode = link?.state === "connected" ? link.mode : "none";
   const path = useRouterState({ select: (state) => state.location.pathname });
   useEscapeStops();
   return (
