@@ -11,14 +11,12 @@ from collections.abc import Callable, Coroutine, Mapping
 from typing import Any
 
 from app.cli.arguments import seconds
-from app.cli.connecting import connected, find_nodes, make_connection, run_command, sheets_of
+from app.cli.connecting import connected, find_nodes, make_connection, named_turbine, run_command, sheets_of
 from app.cli.output import Output, error_text
 from app.cli.targets import (
     add_connection,
-    bare_turbine,
     description_id,
     find_device,
-    site_turbine,
 )
 from app.drivers.contract import FoundNode
 from app.errors import HubsideError, RecordingError, UnverifiedError, UsageError
@@ -69,7 +67,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 async def _scan(arguments: argparse.Namespace, output: Output) -> int:
     started = time.monotonic()
     sheets = sheets_of(arguments, output)
-    found = await find_nodes(arguments, output, sheets)
+    found = await find_nodes(arguments, output, sheets, await named_turbine(arguments, output))
     if output.as_json:
         output.result([_found_dict(node, description_id(sheets, node)) for node in found], "")
     elif found:
@@ -279,13 +277,14 @@ async def _backup(arguments: argparse.Namespace, output: Output) -> int:
 
 
 async def _record(arguments: argparse.Namespace, output: Output) -> int:
-    turbine = site_turbine(arguments) or bare_turbine(arguments.can)
+    sheets = sheets_of(arguments, output)
+    turbine = await named_turbine(arguments, output)
     stop = asyncio.Event()
     loop = asyncio.get_running_loop()
     for number in (signal.SIGINT, signal.SIGTERM):
         with contextlib.suppress(NotImplementedError):  # Windows: Ctrl-C comes as KeyboardInterrupt
             loop.add_signal_handler(number, stop.set)
-    connection = make_connection(arguments, turbine, sheets_of(arguments, output), True)
+    connection = make_connection(arguments, turbine, sheets, True)
     async with connection:
         output.say("cli.stop_hint")
         with contextlib.suppress(TimeoutError):

@@ -9,11 +9,14 @@ import signal
 import sys
 from collections.abc import AsyncIterator, Coroutine
 from contextlib import asynccontextmanager
+from dataclasses import replace
 from typing import Any
 
 from app.cli.output import Output, tell_warning
 from app.cli.runtime import spare_collector
 from app.cli.targets import Sheets, bare_turbine, descriptions_for, scanned_turbine, site_turbine
+from app.drivers.bitrate_search import SEARCH_LISTEN_S, search_bitrate
+from app.drivers.can_config import parse_can
 from app.drivers.contract import FoundNode
 from app.errors import NoAnswerError, UsageError
 from app.model.address import is_decimal
@@ -49,17 +52,46 @@ async def connected(
     arguments: argparse.Namespace, output: Output, record: bool | None = None
 ) -> AsyncIterator[Connection]:
     """The connection that the arguments name; on a bare bus the devices are found by a scan first."""
-    turbine = site_turbine(arguments)
     sheets = sheets_of(arguments, output)
-    if turbine is None:
+    turbine = await named_turbine(arguments, output)
+    if arguments.site is None:
         nodes = _named_nodes(arguments)
-        found = await find_nodes(arguments, output, sheets, nodes)
-        turbine = scanned_turbine(arguments.can, sheets, found)
+        found = await find_nodes(arguments, output, sheets, turbine, nodes)
+        turbine = scanned_turbine(turbine.buses[0].connection, sheets, found)
         _all_there(nodes, found, turbine)
     connection = make_connection(arguments, turbine, sheets, arguments.record if record is None else record)
     spare_collector()
     async with connection:
         yield connection
+
+
+async def named_turbine(arguments: argparse.Namespace, output: Output) -> Turbine:
+    """The turbine of the site file, or a bare bus; bit rates that are to be searched are found here, silently.
+
+    Raises SiteError, UsageError, and what ``search_bitrate`` raises.
+    """
+    turbine = site_turbine(arguments)
+    if turbine is None:
+        return bare_turbine(await _with_bitrate(arguments.can, arguments.listen_s, output))
+    buses = [
+        replace(bus, connection=await _with_bitrate(bus.connection, arguments.listen_s, output))
+        for bus in turbine.buses
+    ]
+    return replace(turbine, buses=tuple(buses))
+
+
+async def _with_bitrate(connection: str, listen_s: float, output: Output) -> str:
+    """``connection`` with the bit rate that was found, where it asks to search for one."""
+    config = parse_can(connection)
+    if not config.search:
+        return connection
+
+    def on_try(bitrate: int) -> None:
+        output.progress("cli.bitrate_trying", bus=connection, bitrate=bitrate)
+
+    bitrate = await search_bitrate(config, max(listen_s, SEARCH_LISTEN_S), on_try)
+    output.say("cli.bitrate_found", bus=connection, bitrate=bitrate)
+    return str(replace(config, bitrate=bitrate, search=False))
 
 
 def sheets_of(arguments: argparse.Namespace, output: Output) -> Sheets:
@@ -98,10 +130,9 @@ def _named_nodes(arguments: argparse.Namespace) -> list[int] | None:
 
 
 async def find_nodes(
-    arguments: argparse.Namespace, output: Output, sheets: Sheets, nodes: list[int] | None = None
+    arguments: argparse.Namespace, output: Output, sheets: Sheets, turbine: Turbine, nodes: list[int] | None = None
 ) -> list[FoundNode]:
-    """Scan; only ``nodes`` where given."""
-    turbine = site_turbine(arguments) or bare_turbine(arguments.can)
+    """Scan the buses of ``turbine``; only ``nodes`` where given."""
     output.say("cli.listening", bus=", ".join(bus.connection for bus in turbine.buses))
     async with make_connection(arguments, turbine, sheets, False) as connection:
         found = [await link.driver.scan(nodes) for link in connection.buses.values()]

@@ -24,7 +24,7 @@ def add_connection(parser: argparse.ArgumentParser) -> None:
     where = parser.add_mutually_exclusive_group(required=True)
     where.add_argument("--site", type=Path, help="site file that names turbines, stations and devices")
     where.add_argument(
-        "--can", metavar="INTERFACE:CHANNEL[@BITRATE]", help="socketcan:can0@500000, pcan:PCAN_USBBUS1 …"
+        "--can", metavar="INTERFACE:CHANNEL[@BITRATE]", help="socketcan:can0@500000, slcan:COM3@search …"
     )
     parser.add_argument("--turbine", help="which turbine of the site file, where it names several")
     parser.add_argument(

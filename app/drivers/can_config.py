@@ -4,6 +4,7 @@
 ``socketcand:127.0.0.1:29536[/can0]``       a socketcand server; ``[::1]:29536`` for IPv6
 ``socketcan:can0``                          a Linux network interface; its bit rate is set with ``ip link``
 ``slcan:/dev/ttyACM0@500000``               a serial adapter, also ``slcan:COM3``
+``slcan:/dev/ttyACM0@search``               its bit rate is found by listening (slcan, pcan, kvaser, vector)
 ``pcan:PCAN_USBBUS1@250000``                PEAK
 ``kvaser:0``, ``ixxat:0``, ``vector:0``     channel number (ixxat and vector need their vendor's driver)
 ``virtual:name``                            python-can's bus inside one process
@@ -21,6 +22,8 @@ from app.errors import UsageError
 
 DEFAULT_BITRATE: Final = 500_000
 """In bit/s, where the connection names none."""
+SEARCH: Final = "search"
+"""In place of the bit rate: find it by listening (``app.drivers.bitrate_search``)."""
 _BITRATES: Final = (10_000, 1_000_000)
 """Least and highest bit rate of classic CAN adapters."""
 
@@ -61,6 +64,7 @@ class CanConfig:
     """One CAN connection. ``host`` and ``port`` are of socketcand only; ``extra`` goes to python-can as it is.
 
     ``bitrate`` in bit/s: where the interface cannot set it, what the bus is taken to have (for its load).
+    ``search``: the bit rate is still to be found, and nothing can be opened before that.
     ``listen_only``: nothing is sent; the adapter is put into its silent mode where it has one.
     """
 
@@ -70,14 +74,16 @@ class CanConfig:
     host: str = ""
     port: int = 0
     listen_only: bool = False
+    search: bool = False
     extra: dict[str, Any] = field(default_factory=dict)
 
     def __str__(self) -> str:
         """The text that ``parse_can`` reads."""
+        rate = SEARCH if self.search else self.bitrate
         if self.interface is CanInterface.SOCKETCAND:
             host = f"[{self.host}]" if ":" in self.host else self.host
-            return f"socketcand:{host}:{self.port}/{self.channel}@{self.bitrate}"
-        return f"{self.interface.value}:{self.channel}@{self.bitrate}"
+            return f"socketcand:{host}:{self.port}/{self.channel}@{rate}"
+        return f"{self.interface.value}:{self.channel}@{rate}"
 
     @property
     def sets_bitrate(self) -> bool:
@@ -106,7 +112,7 @@ class CanConfig:
 
 
 def parse_can(text: str) -> CanConfig:
-    """Read ``INTERFACE:CHANNEL[@BITRATE]``. Raises UsageError that names the part that is wrong."""
+    """Read ``INTERFACE:CHANNEL[@BITRATE|@search]``. Raises UsageError that names the part that is wrong."""
     name, colon, rest = text.partition(":")
     try:
         interface = CanInterface(name)
@@ -116,17 +122,18 @@ def parse_can(text: str) -> CanConfig:
     if not colon:
         raise _wrong(text, f"the channel is missing, as in {name}:CHANNEL[@BITRATE]")
     channel, at, rate = rest.rpartition("@")
+    search = bool(at) and rate == SEARCH
     if not at:
         channel, bitrate = rest, DEFAULT_BITRATE
     else:
-        bitrate = _bitrate(text, interface, rate)
+        bitrate = DEFAULT_BITRATE if search else _bitrate(text, interface, rate)
     if interface is CanInterface.SOCKETCAND:
-        return _socketcand(text, channel, bitrate)
+        return replace(_socketcand(text, channel, bitrate), search=search)
     if not channel:
         raise _wrong(text, "the channel is empty")
     if interface in _NUMBERED and not re.fullmatch(r"[0-9]{1,3}", channel):
         raise _wrong(text, f"channel '{channel}' is no number, which {name} needs")
-    return CanConfig(interface, channel, bitrate)
+    return CanConfig(interface, channel, bitrate, search=search)
 
 
 def _wrong(text: str, reason: str) -> UsageError:

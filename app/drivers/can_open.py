@@ -27,6 +27,9 @@ def open_link(config: CanConfig, timeout_s: float) -> CanLink:
 
     ``timeout_s`` holds for socketcand; other interfaces take the time that their drivers take.
     """
+    if config.search:
+        # Going active at a guessed bit rate would stop the whole bus.
+        raise LinkError("its bit rate has not been found yet")
     try:
         if config.interface is CanInterface.SOCKETCAND:
             return SocketcandLink(config, timeout_s)
