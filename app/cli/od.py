@@ -8,7 +8,7 @@ from pathlib import Path
 from app.cli.output import Output, tell_warning
 from app.cli.targets import SHEET_SUFFIXES
 from app.errors import UsageError
-from app.model.address import parse_address
+from app.model.address import Addressing, parse_address
 from app.model.checks import limits_of
 from app.model.description import Description, Entry
 from app.model.description_file import BUILTIN, builtin_folder, load, load_builtin, problems
@@ -70,8 +70,9 @@ def _list(output: Output) -> int:
     rows = []
     for name in BUILTIN:
         one = load_builtin(name)
-        indices = len({entry.address.major for entry in one})
-        rows.append((one.id, one.version, one.bus.value, str(indices), str(len(one.entries)), one.manual))
+        is_od = one.addressing is Addressing.OD
+        objects = len({entry.address.major for entry in one}) if is_od else len(one.entries)
+        rows.append((one.id, one.version, one.bus.value, str(objects), str(len(one.entries)), one.manual))
     if output.as_json:
         keys = ("id", "version", "bus", "objects", "rows", "manual")
         output.result([dict(zip(keys, row, strict=True)) for row in rows], "")
