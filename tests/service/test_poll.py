@@ -77,12 +77,24 @@ async def steadily(holds: Callable[[], bool], for_s: float) -> None:
         await asyncio.sleep(0.02)
 
 
+async def all_the_while(holds: Callable[[], bool], for_s: float, tries: int = 50) -> float:
+    """Wait until ``holds`` was true for ``for_s`` on end; since when, in s. A busy host may break a first attempt."""
+    for _ in range(tries):
+        await until(holds)
+        since_s = time.monotonic()
+        while holds():
+            if time.monotonic() - since_s > for_s:
+                return since_s
+            await asyncio.sleep(0.02)
+    raise AssertionError(f"never true for {for_s} s on end")
+
+
 async def test_the_asked_rate_is_kept(connection: Connection, asked: Asked) -> None:
     """Fast objects every period, slow ones every tenth; the name once."""
     async with polling(connection):
         await until(lambda: len(asked.times(PMC, POSITION)) >= 31)
     times = asked.times(PMC, POSITION)[:31]
-    assert 30 * PERIOD_S * 0.9 < times[-1] - times[0] < 30 * PERIOD_S * 1.3, "thirty periods"
+    assert 30 * PERIOD_S * 0.9 < times[-1] - times[0] < 30 * PERIOD_S * 3, "thirty periods, more on a busy host"
     slow = asked.times(PMC, Address(0x6061), times[0] - PERIOD_S / 2)
     assert 3 <= len(slow) <= 4
     for target in connection.targets:
@@ -136,9 +148,9 @@ def foreigner(served: Served) -> Port:
 
 
 async def test_a_full_bus_is_left_alone(connection: Connection, asked: Asked, served: Served) -> None:
-    """Frames of others take three quarters of the bus for a while."""
+    """Frames of others take nine tenths of the bus for a while."""
     link = connection.buses["can0"]
-    every_ns, frames = 20 * MS, 57  # of some 131 bits
+    every_ns, frames = 20 * MS, 69  # of some 131 bits
     flooding = True
 
     def flood(port: Port, t_ns: int) -> None:
@@ -150,9 +162,8 @@ async def test_a_full_bus_is_left_alone(connection: Connection, asked: Asked, se
     async with polling(connection):
         await asked_again(asked, PMC)
         served.thread.call_soon(lambda: flood(foreigner(served), served.line.now_ns))
-        await until(lambda: link.bus_load(connection.stamper()) > LOAD_CAP + 0.05)
-        over_s = time.monotonic() + PERIOD_S  # a round may be on its way
-        await steadily(lambda: link.bus_load(connection.stamper()) > LOAD_CAP, 0.8)
+        over_s = await all_the_while(lambda: link.bus_load(connection.stamper()) > LOAD_CAP, 1.0)
+        over_s += PERIOD_S  # a round may have been on its way
         assert [len(asked.times(target.node, since_s=over_s)) for target in connection.targets] == [0] * 6
         flooding = False
         await until(lambda: link.bus_load(connection.stamper()) < LOAD_CAP)
