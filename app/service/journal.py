@@ -9,15 +9,9 @@ from enum import Enum
 from threading import Lock
 from typing import Any, Final
 
+from app.wire.events import Severity
+
 KEPT: Final = 2000
-
-
-class Severity(Enum):
-    """How much attention an event asks for."""
-
-    INFO = "info"
-    WARNING = "warning"
-    ERROR = "error"
 
 
 class Kind(Enum):
