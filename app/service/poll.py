@@ -16,12 +16,15 @@ from app.service.devices import Target
 from app.service.link import DEVICE_NAME
 from app.wire.nmt import NmtState
 from app.wire.records import Source
+from app.wire.sdo import Abort
 
 log = logging.getLogger(__name__)
 
 PERIOD_S: Final = 0.1
 SLOW_EVERY: Final = 10
 """Slow objects are read in every tenth round."""
+RARE_EVERY: Final = 100
+"""Rare objects are read in every hundredth round."""
 LOAD_CAP: Final = 0.6
 """Above this bus load nothing is polled."""
 OTHER_CLIENT_NS: Final = 3_000_000_000
@@ -35,9 +38,23 @@ FAST: Final = tuple(map(parse_address, ("6041", "6064", "606C", "3000", "3060"))
 SLOW: Final = tuple(
     map(
         parse_address,
-        ("603F", "607A", "6061", "6078", "6079", "6510:03", "6410:09", "3063", "3080", "3010", "3011", "3062", "3070"),
+        (
+            *("603F", "607A", "6061", "6078", "6079", "6510:03", "6410:09", "60F4", "60FD", "60FE:03"),
+            *("3063", "3080", "3010", "3011", "3062", "3070", "30FD", "30FE:03"),
+        ),
     )
 )
+RARE: Final = tuple(
+    map(
+        parse_address,
+        (
+            *("6040", "6864", "1003:00", "3001", "3002", "3003", "3004", "3012", "3013", "3053", "3081"),
+            *(f"3061:{bloc:02}" for bloc in range(1, 9)),
+        ),
+    )
+)
+
+_LASTING: Final = frozenset({Abort.NO_OBJECT, Abort.NO_SUB_INDEX, Abort.WRITE_ONLY})
 
 
 class Poller:
@@ -59,20 +76,30 @@ class Poller:
                 log.error("polling %s had ended by a defect", target.slug, exc_info=end)
 
     async def _poll(self, target: Target) -> None:
+        """What the device refused once is not asked again before it starts anew: each refusal is an event."""
         fast = [address for address in FAST if address in target.description.entries]
         slow = [address for address in SLOW if address in target.description.entries]
+        rare = [address for address in RARE if address in target.description.entries]
         loop = asyncio.get_running_loop()
-        nameless: int | None = None
+        refused: set[Address] = set()
+        era = self._era(target)
         turn = 0
         due = loop.time()
         while True:
             if self._allowed(target):
-                wanted = self._not_in_pdos(target, [*fast, *slow] if turn % SLOW_EVERY == 0 else fast)
-                boots, _ = self._era(target)
-                if boots != nameless and self._must_be_named(target):
+                wanted = list(fast)
+                if turn % SLOW_EVERY == 0:
+                    wanted += slow
+                if turn % RARE_EVERY == RARE_EVERY - 1:
+                    wanted += rare
+                wanted = self._not_in_pdos(target, wanted)
+                if self._must_be_named(target):
                     wanted.insert(0, DEVICE_NAME)
-                if isinstance((await self._read(target, wanted)).get(DEVICE_NAME), SdoAbortError):
-                    nameless = boots
+                if era != self._era(target):
+                    era = self._era(target)
+                    refused.clear()
+                answers = await self._read(target, [address for address in wanted if address not in refused])
+                refused.update(address for address, answer in answers.items() if _is_lasting(address, answer))
             turn += 1
             due = max(due + self._period_s, loop.time())
             await asyncio.sleep(due - loop.time())
@@ -136,3 +163,8 @@ class Poller:
         if value is None or value.reading is None or value.reading.source is not Source.PDO_TX:
             return False
         return self._connection.stamper() - value.reading.t_ns < PDO_QUIET_NS
+
+
+def _is_lasting(address: Address, answer: bytes | HubsideError) -> bool:
+    """True for a refusal that the next request would meet as well; a name that is refused once is refused always."""
+    return isinstance(answer, SdoAbortError) and (address == DEVICE_NAME or answer.abort_code in _LASTING)
