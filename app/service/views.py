@@ -33,6 +33,8 @@ _MODE: Final = Address(0x6061)
 _POSITION_MODES: Final = (1, 8)
 """Profile position and cyclic synchronous position (CiA 402, modes of operation)."""
 _VELOCITY: Final = (Address(0x606C), Address(0x506C))
+_FOLLOWING_ERROR: Final = (Address(0x60F4), Address(0x50F4))
+_CURRENT: Final = (Address(0x6078),)
 _DC_LINK: Final = (Address(0x6079), Address(0x5079), Address(0x3063))
 _SOC: Final = (Address(0x3080),)
 _BATTERY: Final = (Address(0x3060),)
@@ -59,6 +61,8 @@ _SOURCE: Final[Mapping[Source, SourceName]] = {
     Source.EMCY: "emcy",
 }
 ENABLED: Final = "axis_state.operation_enabled"
+_COMPLAINTS: Final = ((STATUSWORD, 1 << 7, 1 << 3), (Address(0x3000), 1 << 1, 1 << 2))
+"""Status objects with their bits of warning and of fault (CiA 402, statusword; OAT manual, table 11)."""
 _STATES: Final = (
     (0x4F, 0x00, "not_ready_to_switch_on"),
     (0x4F, 0x40, "switch_on_disabled"),
@@ -86,10 +90,21 @@ class NodeLine:
 
 
 @dataclass(frozen=True, slots=True)
+class FaultLine:
+    """What a device complains of. ``text_key`` None: its description does not know the code."""
+
+    device: str
+    code: int
+    text_key: str | None
+    severity: Literal["warning", "error"]
+
+
+@dataclass(frozen=True, slots=True)
 class AxisLine:
     """One blade. ``state`` and ``fault_text_key`` are text keys; ``fault_code`` 0 is no fault, None not known.
 
-    ``demand_deg`` is None while the axis does not follow a target position.
+    ``fault_code`` is that of the worst of ``faults``. ``demand_deg`` is None while the axis does not follow a target
+    position. ``current_pct`` is in per cent of the rated current.
     ``stale``: the position is not known, older than a second, or its node is silent.
     """
 
@@ -99,9 +114,12 @@ class AxisLine:
     position_t_ns: int | None
     demand_deg: float | None
     velocity_dps: float | None
+    following_error_deg: float | None
+    current_pct: float | None
     state: str | None
     fault_code: int | None
     fault_text_key: str | None
+    faults: tuple[FaultLine, ...]
     battery_soc_pct: float | None
     battery_v: float | None
     dc_link_v: float | None
@@ -196,7 +214,7 @@ def axis_lines(turbine: Turbine, targets: Mapping[str, Target], now_ns: int) -> 
 def _axis_line(station: Station, blade: int, devices: list[Target], now_ns: int) -> AxisLine:
     position = _latest(devices, _POSITION)
     state = next((axis_state(raw) for raw in _lookups(devices, STATUSWORD) if isinstance(raw, int)), None)
-    code, text_key = _fault(devices)
+    faults, code = _faults(devices)
     return AxisLine(
         station=station.slug,
         blade=blade,
@@ -204,9 +222,12 @@ def _axis_line(station: Station, blade: int, devices: list[Target], now_ns: int)
         position_t_ns=None if position is None else position.t_ns,
         demand_deg=_demand(devices, state),
         velocity_dps=_number(_latest(devices, _VELOCITY)),
+        following_error_deg=_number(_latest(devices, _FOLLOWING_ERROR)),
+        current_pct=_number(_latest(devices, _CURRENT)),
         state=state,
         fault_code=code,
-        fault_text_key=text_key,
+        fault_text_key=faults[0].text_key if faults else None,
+        faults=faults,
         battery_soc_pct=_number(_latest(devices, _SOC)),
         battery_v=_number(_latest(devices, _BATTERY)),
         dc_link_v=_number(_latest(devices, _DC_LINK)),
@@ -256,18 +277,28 @@ def _number(seen: _Seen | None) -> float | None:
     return None if seen is None else seen.number
 
 
-def _fault(devices: Iterable[Target]) -> tuple[int | None, str | None]:
-    """The error code of the first device that has one, by its error code object or its latest emergency message."""
-    known = None
+def _faults(devices: Iterable[Target]) -> tuple[tuple[FaultLine, ...], int | None]:
+    """What the devices complain of, errors first, and the code of the worst; 0: nothing, None: not known."""
+    known: int | None = None
+    found = []
     for device in devices:
         code = _error_code(device)
-        if code is None:
-            continue
+        known = known if code is None else 0
         if code:
             error = device.description.errors.get(code)
-            return code, None if error is None else error.text_key
-        known = 0
-    return known, None
+            text_key = None if error is None else error.text_key
+            found.append(FaultLine(device.slug, code, text_key, "warning" if _only_warns(device) else "error"))
+    found.sort(key=lambda line: line.severity)
+    return tuple(found), found[0].code if found else known
+
+
+def _only_warns(device: Target) -> bool:
+    """True where the device's status shows a warning and no fault; what is not known is taken for a fault."""
+    for address, warning, fault in _COMPLAINTS:
+        status = device.lookup(address)
+        if isinstance(status, int):
+            return bool(status & warning) and not status & fault
+    return False
 
 
 def _error_code(device: Target) -> int | None:
