@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 import threading
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from queue import Empty, Queue
 from types import TracebackType
 from typing import Any, Final, Self
@@ -18,19 +19,31 @@ STOP_TIMEOUT_S: Final = 15.0
 class Child:
     """``python -m MODULE ARGUMENTS``. Its end: standard input is closed; what does not end by that is killed.
 
-    ``quiet``: what it says on standard error is thrown away.
+    ``quiet``: what it says on standard error is thrown away. ``environment`` stands in for ours where given.
     """
 
-    def __init__(self, module: str, *arguments: str, quiet: bool = False) -> None:
+    def __init__(
+        self, module: str, *arguments: str, quiet: bool = False, environment: Mapping[str, str] | None = None
+    ) -> None:
         self.module = module
         self._lines: Queue[str] = Queue()
         command: Sequence[str] = (sys.executable, "-u", "-m", module, *arguments)
         stderr = subprocess.DEVNULL if quiet else None
         self._process = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=stderr, text=True
+            command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=stderr,
+            text=True,
+            env=dict(os.environ if environment is None else environment),
         )
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
+
+    @property
+    def pid(self) -> int:
+        """The process."""
+        return self._process.pid
 
     def tell(self, **message: Any) -> None:
         """Send a line."""
