@@ -20,17 +20,27 @@ from app.errors import HubsideError, UsageError
 from app.model.texts import load_texts
 from app.settings import settings_from
 
-COMMANDS: Final = ("od", "twin", "bus", "recordings", "serve")
-"""Modules of this package, each with ``add_parser``."""
+COMMANDS: Final = {
+    "od": ("od",),
+    "twin": ("twin",),
+    "bus": ("scan", "read", "write", "save", "restart", "backup", "record"),
+    "recordings": ("export", "recover"),
+    "serve": ("serve", "demo"),
+}
+"""Modules of this package, each with ``add_parser``, and the commands that it adds."""
 
 
-def build_parser() -> argparse.ArgumentParser:
-    """All commands with their arguments."""
+def build_parser(arguments: Sequence[str] = ()) -> argparse.ArgumentParser:
+    """The parser of all commands, or of those that ``arguments`` name.
+
+    A command's module brings its libraries along: what was not asked for is not waited for.
+    """
     parser = argparse.ArgumentParser(prog="hubside", description="The service bench for turbine pitch drives.")
     parser.add_argument("--version", action="version", version=f"hubside {__version__}")
     parser.set_defaults(json=False, data=None, verbose=False)
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for name in COMMANDS:
+    named = [module for module, names in COMMANDS.items() if set(names) & set(arguments)]
+    for name in named or COMMANDS:
         importlib.import_module(f"app.cli.{name}").add_parser(commands)
     _add_common(parser)
     return parser
@@ -59,7 +69,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _main(arguments: Sequence[str] | None) -> int:
-    parsed = build_parser().parse_args(arguments)
+    given = sys.argv[1:] if arguments is None else arguments
+    parsed = build_parser(given).parse_args(given)
     logging.basicConfig(
         level=logging.DEBUG if parsed.verbose else logging.WARNING,
         format="%(asctime)s %(levelname)s %(name)s: %(message)s",

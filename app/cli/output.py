@@ -6,7 +6,7 @@ import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 from app.errors import (
     DeviceError,
@@ -17,8 +17,10 @@ from app.errors import (
     UnverifiedError,
     UsageError,
 )
-from app.model.eds import EdsWarning
 from app.model.texts import Texts
+
+if TYPE_CHECKING:
+    from app.model.eds import EdsWarning
 
 
 class Output:
