@@ -70,12 +70,19 @@ class Turbine:
 def load_site(path: Path) -> tuple[Turbine, ...]:
     """Read a site file. Raises SiteError with file, key and reason."""
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
+        text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise SiteError(file=str(path), key="*", reason=f"cannot be read: {error}") from error
+    return read_site(text, str(path))
+
+
+def read_site(text: str, file: str) -> tuple[Turbine, ...]:
+    """Read the text of a site file; ``file`` names it in errors. Raises SiteError with file, key and reason."""
+    try:
+        data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise SiteError(file=str(path), key="*", reason=f"no valid TOML: {error}") from error
-    return _Reader(str(path)).turbines(data)
+        raise SiteError(file=file, key="*", reason=f"no valid TOML: {error}") from error
+    return _Reader(file).turbines(data)
 
 
 class _Reader:

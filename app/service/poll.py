@@ -7,62 +7,40 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from collections.abc import Callable
 from typing import Final
 
 from app.errors import HubsideError, SdoAbortError
-from app.model.address import Address, parse_address
+from app.model.address import Address
+from app.model.description import Description
 from app.service.connection import Connection
 from app.service.devices import Target
 from app.service.link import DEVICE_NAME
+from app.service.polling import USUAL, PollPlan, Rate
 from app.wire.nmt import NmtState
 from app.wire.records import Source
 from app.wire.sdo import Abort
 
 log = logging.getLogger(__name__)
 
-PERIOD_S: Final = 0.1
-SLOW_EVERY: Final = 10
-"""Slow objects are read in every tenth round."""
-RARE_EVERY: Final = 100
-"""Rare objects are read in every hundredth round."""
-LOAD_CAP: Final = 0.6
-"""Above this bus load nothing is polled."""
 OTHER_CLIENT_NS: Final = 3_000_000_000
 """So long after another SDO client's last transfer with a node nothing is polled there."""
 BACK_OFF_S: Final = 3.0
 """A node that does not answer is left alone for so long, or until it starts anew."""
+LOOK_S: Final = 0.1
+"""While a node is left alone it is looked that often whether it has started anew."""
 PDO_QUIET_NS: Final = 800_000_000
 """A PDO that brought nothing for so long is not active: what it carries is polled before it counts as old."""
-
-FAST: Final = tuple(map(parse_address, ("6041", "6064", "606C", "3000", "3060")))
-SLOW: Final = tuple(
-    map(
-        parse_address,
-        (
-            *("603F", "607A", "6061", "6078", "6079", "6510:03", "6410:09", "60F4", "60FD", "60FE:03"),
-            *("3063", "3080", "3010", "3011", "3062", "3070", "30FD", "30FE:03"),
-        ),
-    )
-)
-RARE: Final = tuple(
-    map(
-        parse_address,
-        (
-            *("6040", "6864", "1003:00", "3001", "3002", "3003", "3004", "3012", "3013", "3053", "3081"),
-            *(f"3061:{bloc:02}" for bloc in range(1, 9)),
-        ),
-    )
-)
 
 _LASTING: Final = frozenset({Abort.NO_OBJECT, Abort.NO_SUB_INDEX, Abort.WRITE_ONLY})
 
 
 class Poller:
-    """Reads on behalf of the screens until ``close``."""
+    """Reads on behalf of the screens until ``close``; ``plan`` is asked in every round, so a change counts at once."""
 
-    def __init__(self, connection: Connection, period_s: float = PERIOD_S) -> None:
+    def __init__(self, connection: Connection, plan: Callable[[], PollPlan] = lambda: USUAL) -> None:
         self._connection = connection
-        self._period_s = period_s
+        self._plan = plan
         self._tasks = [asyncio.create_task(self._poll(target)) for target in connection.targets]
 
     async def close(self) -> None:
@@ -77,22 +55,18 @@ class Poller:
 
     async def _poll(self, target: Target) -> None:
         """What the device refused once is not asked again before it starts anew: each refusal is an event."""
-        fast = [address for address in FAST if address in target.description.entries]
-        slow = [address for address in SLOW if address in target.description.entries]
-        rare = [address for address in RARE if address in target.description.entries]
         loop = asyncio.get_running_loop()
         refused: set[Address] = set()
         era = self._era(target)
         turn = 0
         due = loop.time()
+        rounds = _Rounds(self._plan(), target.description)
         while True:
-            if self._allowed(target):
-                wanted = list(fast)
-                if turn % SLOW_EVERY == 0:
-                    wanted += slow
-                if turn % RARE_EVERY == RARE_EVERY - 1:
-                    wanted += rare
-                wanted = self._not_in_pdos(target, wanted)
+            plan = self._plan()
+            if plan is not rounds.plan:
+                rounds = _Rounds(plan, target.description)
+            if self._allowed(target, plan.load_cap):
+                wanted = self._not_in_pdos(target, rounds.due_in(turn))
                 if self._must_be_named(target):
                     wanted.insert(0, DEVICE_NAME)
                 if era != self._era(target):
@@ -101,7 +75,7 @@ class Poller:
                 answers = await self._read(target, [address for address in wanted if address not in refused])
                 refused.update(address for address, answer in answers.items() if _is_lasting(address, answer))
             turn += 1
-            due = max(due + self._period_s, loop.time())
+            due = max(due + plan.period_s, loop.time())
             await asyncio.sleep(due - loop.time())
 
     async def _read(self, target: Target, wanted: list[Address]) -> dict[Address, bytes | HubsideError]:
@@ -123,7 +97,7 @@ class Poller:
         loop = asyncio.get_running_loop()
         until = loop.time() + BACK_OFF_S
         while loop.time() < until and self._era(target) == era:  # noqa: ASYNC110  the live state has no event for it
-            await asyncio.sleep(self._period_s)
+            await asyncio.sleep(LOOK_S)
 
     def _era(self, target: Target) -> tuple[int, int]:
         """Changes where another device may stand at the node: with each boot-up and each connection."""
@@ -131,14 +105,14 @@ class Poller:
         view = self._connection.live.node(link.name, target.node)
         return (0 if view is None else view.boots), link.status.reconnects
 
-    def _allowed(self, target: Target) -> bool:
+    def _allowed(self, target: Target, load_cap: float) -> bool:
         """True while the bus has room and nobody else talks to the device."""
         link = self._connection.buses[target.device.bus]
         now_ns = self._connection.stamper()
         view = self._connection.live.node(link.name, target.node)
         other_ns = None if view is None else view.other_client_ns
         alone = other_ns is None or now_ns - other_ns > OTHER_CLIENT_NS
-        return alone and link.bus_load(now_ns) < LOAD_CAP
+        return alone and link.bus_load(now_ns) < load_cap
 
     def _not_in_pdos(self, target: Target, wanted: list[Address]) -> list[Address]:
         """A new list, without what a PDO brings by itself while the node is operational."""
@@ -168,3 +142,21 @@ class Poller:
 def _is_lasting(address: Address, answer: bytes | HubsideError) -> bool:
     """True for a refusal that the next request would meet as well; a name that is refused once is refused always."""
     return isinstance(answer, SdoAbortError) and (address == DEVICE_NAME or answer.abort_code in _LASTING)
+
+
+class _Rounds:
+    """What a plan reads of one device, round by round."""
+
+    def __init__(self, plan: PollPlan, description: Description) -> None:
+        self.plan = plan
+        items = [(address, rate) for address, rate in plan.of(description).items() if address in description.entries]
+        self._at = {rate: [address for address, at in items if at is rate] for rate in Rate}
+
+    def due_in(self, turn: int) -> list[Address]:
+        """The objects of round ``turn``, a new list."""
+        wanted = list(self._at[Rate.FAST])
+        if turn % self.plan.slow_every == 0:
+            wanted += self._at[Rate.SLOW]
+        if turn % self.plan.rare_every == self.plan.rare_every - 1:
+            wanted += self._at[Rate.RARE]
+        return wanted

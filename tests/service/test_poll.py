@@ -13,7 +13,8 @@ from app.drivers.contract import LinkState
 from app.model.address import Address
 from app.service.connection import Connection
 from app.service.link import DEVICE_NAME, TwinWatch
-from app.service.poll import BACK_OFF_S, LOAD_CAP, OTHER_CLIENT_NS, Poller
+from app.service.poll import BACK_OFF_S, OTHER_CLIENT_NS, Poller
+from app.service.polling import PollPlan
 from app.twins.line import Port
 from app.twins.socketcand_server import SocketcandServer
 from app.wire import sdo
@@ -55,7 +56,7 @@ def asked(connection: Connection) -> Asked:
 
 @asynccontextmanager
 async def polling(connection: Connection) -> AsyncIterator[None]:
-    poller = Poller(connection, PERIOD_S)
+    poller = Poller(connection)
     try:
         yield
     finally:
@@ -161,11 +162,11 @@ async def test_a_full_bus_is_left_alone(connection: Connection, asked: Asked, se
     async with polling(connection):
         await asked_again(asked, PMC)
         served.thread.call_soon(lambda: flood(foreigner(served), served.line.now_ns))
-        over_s = await all_the_while(lambda: link.bus_load(connection.stamper()) > LOAD_CAP, 1.0)
+        over_s = await all_the_while(lambda: link.bus_load(connection.stamper()) > PollPlan().load_cap, 1.0)
         over_s += PERIOD_S  # a round may have been on its way
         assert [len(asked.times(target.node, since_s=over_s)) for target in connection.targets] == [0] * 6
         flooding = False
-        await until(lambda: link.bus_load(connection.stamper()) < LOAD_CAP)
+        await until(lambda: link.bus_load(connection.stamper()) < PollPlan().load_cap)
         await asked_again(asked, PMC)
 
 
