@@ -1,0 +1,179 @@
+"""The recordings in the data folder: a list that stays fast, and what one of them holds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+from typing import Any, Final
+
+from app.errors import RecordingError
+from app.recording.content import AttachedFile, EventKind
+from app.recording.reader import Recording, open_recording
+from app.recording.scan import is_finished, map_file, unmap
+from app.recording.schemas import EVENTS_TOPIC, FIXED_TOPICS
+from app.recording.writer import free_space
+from app.service.file_list import FileList
+
+MAX_EVENTS: Final = 500
+_LOSSES: Final = frozenset(
+    {
+        EventKind.FRAMES_LOST,
+        EventKind.GAP,
+        EventKind.BUS_LOST,
+        EventKind.BUS_BACK,
+        EventKind.DISK_ERROR,
+        EventKind.SPACE_LOW,
+        EventKind.RESUMED,
+    }
+)
+"""What tells that a recording does not hold everything."""
+
+
+class FileState(Enum):
+    """How a file stands. ``UNFINISHED``: its end is missing, ``hubside recover`` closes it."""
+
+    LIVE = "live"
+    FINISHED = "finished"
+    UNFINISHED = "unfinished"
+    UNREADABLE = "unreadable"
+
+
+@dataclass(frozen=True, slots=True)
+class Summary:
+    """What a file says of itself. ``frames`` and ``events`` are those of this file, ``part`` counts from 1.
+
+    ``lost`` counts what its recording had lost by the end of the file. Times are Unix ns; None: not told.
+    """
+
+    turbine: str
+    person: str
+    part: int
+    started_ns: int | None
+    first_ns: int | None
+    last_ns: int | None
+    frames: int
+    lost: int | None
+    events: int
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """What one look at a file gave. ``reason``: why it cannot be read."""
+
+    state: FileState
+    summary: Summary | None = None
+    reason: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class RecordingFile:
+    """One file of the list. ``look`` None: not read yet."""
+
+    name: str
+    size_bytes: int
+    modified_ns: int
+    look: Look | None
+
+
+@dataclass(frozen=True, slots=True)
+class RecordingDetails:
+    """What one file holds. ``topics``: messages by topic; ``losses``: events that tell of missing frames."""
+
+    look: Look
+    metadata: Mapping[str, Mapping[str, str]]
+    topics: Mapping[str, int]
+    attachments: tuple[tuple[str, str, int], ...]
+    damages: tuple[tuple[int, int, str, str], ...]
+    losses: tuple[tuple[int, EventKind, str, Mapping[str, Any]], ...]
+
+
+class Recordings:
+    """The recordings of one folder."""
+
+    def __init__(self, folder: Path) -> None:
+        self._list = FileList(folder, "*.mcap", look_at)
+
+    @property
+    def folder(self) -> Path:
+        """Where they lie."""
+        return self._list.folder
+
+    @property
+    def free_bytes(self) -> int | None:
+        """Room on the disk; None where there is no folder yet."""
+        try:
+            return free_space(self.folder)
+        except OSError:
+            return None
+
+    def files(self, live: Path | None) -> list[RecordingFile]:
+        """The files, latest first; ``live`` is the one that is being written. Reads files: not for the event loop."""
+        return [self._file(one.name, one.size_bytes, one.modified_ns, one.content, live) for one in self._list.look()]
+
+    def path(self, name: str) -> Path | None:
+        """The file of that name, or None."""
+        return self._list.path(name)
+
+    @staticmethod
+    def _file(name: str, size: int, modified_ns: int, look: Look | None, live: Path | None) -> RecordingFile:
+        if live is not None and name == live.name:
+            look = Look(FileState.LIVE)
+        return RecordingFile(name, size, modified_ns, look)
+
+
+def look_at(path: Path) -> Look:
+    """What a file says of itself at its end. An unfinished one is not scanned: that can take long."""
+    try:
+        data = map_file(path)
+        try:
+            finished = is_finished(data)
+        finally:
+            unmap(data)
+        if not finished:
+            return Look(FileState.UNFINISHED)
+        with open_recording(path) as recording:
+            return Look(FileState.FINISHED, _summary(recording))
+    except RecordingError as error:
+        return Look(FileState.UNREADABLE, reason=str(error.details["reason"]))
+    except (OSError, ValueError) as error:
+        return Look(FileState.UNREADABLE, reason=str(error))
+
+
+def details(path: Path) -> RecordingDetails:
+    """All that a file tells beside its frames; an unfinished file is scanned. Raises RecordingError."""
+    with open_recording(path) as recording:
+        state = FileState.FINISHED if recording.finished else FileState.UNFINISHED
+        losses = [event for event in recording.events() if event.kind in _LOSSES][:MAX_EVENTS]
+        attachments = tuple((one.name, one.media_type, len(one.data)) for one in recording.attachments())
+        return RecordingDetails(
+            look=Look(state, _summary(recording)),
+            metadata={name: dict(table) for name, table in recording.metadata.items()},
+            topics=dict(recording.topics),
+            attachments=attachments,
+            damages=tuple((one.offset, one.length, one.reason.value, one.detail) for one in recording.damages),
+            losses=tuple((one.t_ns, one.kind, one.bus, one.details) for one in losses),
+        )
+
+
+def attachment(path: Path, name: str) -> AttachedFile | None:
+    """A file inside a recording, or None. Raises RecordingError."""
+    with open_recording(path) as recording:
+        return next((one for one in recording.attachments() if one.name == name), None)
+
+
+def _summary(recording: Recording) -> Summary:
+    info, identity, span, totals = recording.info, recording.identity, recording.span_ns, recording.totals
+    frames = sum(count for topic, count in recording.topics.items() if topic not in FIXED_TOPICS)
+    return Summary(
+        turbine=info.turbine,
+        person=info.who,
+        part=identity.number,
+        started_ns=identity.created_ns or identity.started_ns or None,
+        first_ns=None if span is None else span[0],
+        last_ns=None if span is None else span[1],
+        frames=frames if totals is None else totals.frames,
+        lost=None if totals is None else totals.lost,
+        events=recording.topics.get(EVENTS_TOPIC, 0),
+    )
