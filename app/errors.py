@@ -6,16 +6,31 @@
     ├── UsageError                 exit 2   the command or file does not make sense
     │   ├── DescriptionError                a description or EDS file: file, line, reason
     │   ├── SiteError                       a site file: file, key, reason
-    │   └── SetFileError                    a parameter-set file: file, line, reason
+    │   ├── SetFileError                    a parameter-set file: file, line, reason
+    │   └── StoreError                      the store cannot be opened, read or written
+    │       ├── StoreDamagedError           its file is damaged
+    │       ├── StoreInUseError             another process has the data folder
+    │       └── StoreBusyError              it did not answer in time
     ├── RefusedError               exit 3   refused by us, nothing was sent
     │   ├── UnknownObjectError              the description has no such address
     │   ├── AccessError                     read-only, write-only or factory object
     │   ├── ValueTypeError                  the value does not fit the data type
     │   ├── LimitError                      the value is out of range; names the limit
     │   ├── PreconditionError               another object or state forbids it
+    │   ├── ConflictError                   another value than the one that was seen stands in RAM
     │   ├── MotionError                     the write could set an axis in motion
     │   ├── CommunicationError              the write changes PDOs, or is a save or load command
-    │   └── ConsentError                    active access needs consent (other master seen)
+    │   ├── ConsentError                    active access needs consent (other master seen)
+    │   ├── SettingsError                   a setting cannot be changed so, or not now
+    │   ├── NotConnectedError               no turbine is connected
+    │   ├── RoleError                       the role of the person does not cover it
+    │   ├── LoginError                      name or password is wrong
+    │   ├── LoginPausedError                too many failed logins: wait
+    │   ├── LoginNeededError                users exist, so one must log in
+    │   ├── UserUnknownError                no such user
+    │   ├── UserExistsError                 the name is taken
+    │   ├── UserRuleError                   a name or password that is not taken
+    │   └── LastExpertError                 one expert must remain
     ├── DeviceError                exit 4   the device answered and refused
     │   ├── SdoAbortError                   CiA 301 abort code
     │   └── IdentityError                   another device than expected answered
@@ -79,6 +94,30 @@ class SetFileError(UsageError):
     code = "set_file"
 
 
+class StoreError(UsageError):
+    """The store cannot be opened, read or written. Details: file, reason."""
+
+    code = "store"
+
+
+class StoreDamagedError(StoreError):
+    """The store's file is damaged. Details: file, reason."""
+
+    code = "store_damaged"
+
+
+class StoreInUseError(StoreError):
+    """Another process has the data folder. Details: file."""
+
+    code = "store_in_use"
+
+
+class StoreBusyError(StoreError):
+    """The store did not answer in time; what was asked may still be done. Details: file, timeout_s."""
+
+    code = "store_busy"
+
+
 class RefusedError(HubsideError):
     """Refused before anything was sent. Details: device, address, reason."""
 
@@ -116,6 +155,12 @@ class PreconditionError(RefusedError):
     code = "precondition"
 
 
+class ConflictError(RefusedError):
+    """RAM no longer holds what the change was made from. Details: address, name, expected, found."""
+
+    code = "conflict"
+
+
 class MotionError(RefusedError):
     """The write could set an axis in motion, and nobody has taken charge of that. Details: address, name."""
 
@@ -132,6 +177,66 @@ class ConsentError(RefusedError):
     """Active access needs consent: another master is on the bus. Details: bus, seen."""
 
     code = "consent"
+
+
+class SettingsError(RefusedError):
+    """A setting cannot be changed so, or not now. Details: reason_key (a text key) and what it is about."""
+
+    code = "settings"
+
+
+class NotConnectedError(RefusedError):
+    """No turbine is connected, so no device can be asked."""
+
+    code = "not_connected"
+
+
+class RoleError(RefusedError):
+    """The person's role does not cover it. Details: needs, has (names of roles)."""
+
+    code = "role"
+
+
+class LoginError(RefusedError):
+    """Name or password is wrong; which of them is not told."""
+
+    code = "login"
+
+
+class LoginPausedError(RefusedError):
+    """Too many failed logins under this name from this address. Details: retry_after_s."""
+
+    code = "login_paused"
+
+
+class LoginNeededError(RefusedError):
+    """Users exist, so one must log in."""
+
+    code = "login_needed"
+
+
+class UserUnknownError(RefusedError):
+    """No such user. Details: name."""
+
+    code = "user_unknown"
+
+
+class UserExistsError(RefusedError):
+    """The name is taken, by a disabled user perhaps. Details: name."""
+
+    code = "user_exists"
+
+
+class UserRuleError(RefusedError):
+    """A name or password that is not taken. Details: reason."""
+
+    code = "user_rule"
+
+
+class LastExpertError(RefusedError):
+    """One expert must remain who can log in. Details: name."""
+
+    code = "last_expert"
 
 
 class DeviceError(HubsideError):

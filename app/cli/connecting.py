@@ -9,20 +9,20 @@ import signal
 import sys
 from collections.abc import AsyncIterator, Coroutine
 from contextlib import asynccontextmanager
-from dataclasses import replace
 from typing import Any
 
 from app.cli.output import Output, tell_warning
 from app.cli.runtime import spare_collector
 from app.cli.targets import Sheets, bare_turbine, descriptions_for, scanned_turbine, site_turbine
-from app.drivers.bitrate_search import SEARCH_LISTEN_S, search_bitrate
-from app.drivers.can_config import parse_can
 from app.drivers.contract import FoundNode
 from app.errors import NoAnswerError, UsageError
 from app.model.address import is_decimal
-from app.model.site import Turbine
+from app.model.site import Turbine, load_site
+from app.service.bench import Bench
+from app.service.bitrates import with_bitrate, with_bitrates
 from app.service.connection import Connection
 from app.service.options import Options
+from app.service.sites import Sites
 
 TERMINATED = 143
 """Exit code after SIGTERM, as shells have it."""
@@ -53,16 +53,34 @@ async def connected(
 ) -> AsyncIterator[Connection]:
     """The connection that the arguments name; on a bare bus the devices are found by a scan first."""
     sheets = sheets_of(arguments, output)
-    turbine = await named_turbine(arguments, output)
-    if arguments.site is None:
-        nodes = _named_nodes(arguments)
-        found = await find_nodes(arguments, output, sheets, turbine, nodes)
-        turbine = scanned_turbine(turbine.buses[0].connection, sheets, found)
-        _all_there(nodes, found, turbine)
+    turbine = await _turbine_with_devices(arguments, output, sheets)
     connection = make_connection(arguments, turbine, sheets, arguments.record if record is None else record)
     spare_collector()
     async with connection:
         yield connection
+
+
+async def make_bench(arguments: argparse.Namespace, output: Output, record: bool) -> tuple[str, Bench]:
+    """A bench that knows all turbines of the arguments, and the slug of the one to connect to."""
+    sheets = sheets_of(arguments, output)
+    turbine = await _turbine_with_devices(arguments, output, sheets)
+    known = (turbine,) if arguments.site is None else load_site(arguments.site)
+    home = arguments.settings.data / "site.toml"
+    sites = Sites(known, lambda one: descriptions_for(sheets, one, arguments.site), arguments.site, home)
+    spare_collector()
+    return turbine.slug, Bench(sites, options_of(arguments, record), output.error)
+
+
+async def _turbine_with_devices(arguments: argparse.Namespace, output: Output, sheets: Sheets) -> Turbine:
+    """The turbine of the arguments; on a bare bus with the devices that a scan finds."""
+    turbine = await named_turbine(arguments, output)
+    if arguments.site is not None:
+        return turbine
+    nodes = _named_nodes(arguments)
+    found = await find_nodes(arguments, output, sheets, turbine, nodes)
+    turbine = scanned_turbine(turbine.buses[0].connection, sheets, found)
+    _all_there(nodes, found, turbine)
+    return turbine
 
 
 async def named_turbine(arguments: argparse.Namespace, output: Output) -> Turbine:
@@ -72,26 +90,21 @@ async def named_turbine(arguments: argparse.Namespace, output: Output) -> Turbin
     """
     turbine = site_turbine(arguments)
     if turbine is None:
-        return bare_turbine(await _with_bitrate(arguments.can, arguments.listen_s, output))
-    buses = [
-        replace(bus, connection=await _with_bitrate(bus.connection, arguments.listen_s, output))
-        for bus in turbine.buses
-    ]
-    return replace(turbine, buses=tuple(buses))
+        return bare_turbine(await with_bitrate(arguments.can, arguments.listen_s, _Telling(output)))
+    return await with_bitrates(turbine, arguments.listen_s, _Telling(output))
 
 
-async def _with_bitrate(connection: str, listen_s: float, output: Output) -> str:
-    """``connection`` with the bit rate that was found, where it asks to search for one."""
-    config = parse_can(connection)
-    if not config.search:
-        return connection
+class _Telling:
+    """Tells a search for the bit rate on the command line."""
 
-    def on_try(bitrate: int) -> None:
-        output.progress("cli.bitrate_trying", bus=connection, bitrate=bitrate)
+    def __init__(self, output: Output) -> None:
+        self._output = output
 
-    bitrate = await search_bitrate(config, max(listen_s, SEARCH_LISTEN_S), on_try)
-    output.say("cli.bitrate_found", bus=connection, bitrate=bitrate)
-    return str(replace(config, bitrate=bitrate, search=False))
+    def trying(self, connection: str, bitrate: int) -> None:
+        self._output.progress("cli.bitrate_trying", bus=connection, bitrate=bitrate)
+
+    def found(self, connection: str, bitrate: int) -> None:
+        self._output.say("cli.bitrate_found", bus=connection, bitrate=bitrate)
 
 
 def sheets_of(arguments: argparse.Namespace, output: Output) -> Sheets:
@@ -101,16 +114,21 @@ def sheets_of(arguments: argparse.Namespace, output: Output) -> Sheets:
 
 def make_connection(arguments: argparse.Namespace, turbine: Turbine, sheets: Sheets, record: bool) -> Connection:
     """A connection that is not open yet. Raises OSError where nothing can be recorded in the data folder."""
+    options = options_of(arguments, record)
+    return Connection(turbine, descriptions_for(sheets, turbine, arguments.site), options)
+
+
+def options_of(arguments: argparse.Namespace, record: bool) -> Options:
+    """How connections are made. Raises OSError where nothing can be recorded in the data folder."""
     settings = arguments.settings
     if record:
         settings.recordings.mkdir(parents=True, exist_ok=True)
-    options = Options(
+    return Options(
         person=settings.person,
         recordings=settings.recordings if record else None,
         consent=arguments.consent,
         listen_s=arguments.listen_s,
     )
-    return Connection(turbine, descriptions_for(sheets, turbine, arguments.site), options)
 
 
 def _all_there(nodes: list[int] | None, found: list[FoundNode], turbine: Turbine) -> None:

@@ -16,15 +16,13 @@ from pathlib import Path
 from typing import Any
 
 from app.cli.arguments import milliseconds, port
-from app.cli.connecting import SWITCH_INTERVAL_S, connected
+from app.cli.connecting import SWITCH_INTERVAL_S, make_bench
 from app.cli.output import Output
 from app.cli.targets import add_connection
-from app.errors import BusLostError, BusOpenError
+from app.errors import BusOpenError
 from app.model.description_file import bundled_folder
 from app.recording.recover import recover_all
-from app.service.as_found import read_as_found, unreachable
-from app.service.connection import Connection
-from app.service.poll import Poller
+from app.service.bench import Bench
 from app.settings import DEFAULT_PORT, TWIN_PORT
 
 START_S = 20.0
@@ -108,39 +106,20 @@ async def _serve(arguments: argparse.Namespace, output: Output) -> int:
     for number in (signal.SIGINT, signal.SIGTERM):
         with contextlib.suppress(NotImplementedError):  # Windows: Ctrl-C comes as KeyboardInterrupt
             loop.add_signal_handler(number, stop.set)
-    async with (
-        connected(arguments, output, not arguments.no_record) as connection,
-        _page(arguments, output, connection),
-    ):
-        look = asyncio.create_task(_first_look(connection, settings.person, output))
-        output.say("cli.demo_data", folder=settings.data)
-        output.say("cli.stop_hint")
-        await stop.wait()
-        look.cancel()
-        await asyncio.gather(look, return_exceptions=True)
+    turbine, bench = await make_bench(arguments, output, not arguments.no_record)
+    try:
+        await bench.connect(turbine, settings.person)
+        async with _page(arguments, output, bench):
+            output.say("cli.demo_data", folder=settings.data)
+            output.say("cli.stop_hint")
+            await stop.wait()
+    finally:
+        await bench.close()
     return 0
 
 
-async def _first_look(connection: Connection, person: str, output: Output) -> None:
-    """Read everything once, then keep polling what the screens need."""
-    try:
-        reports = await read_as_found(connection, person)
-    except* BusLostError as lost:
-        for reason in lost.exceptions:
-            if isinstance(reason, BusLostError):
-                output.error(reason)
-    else:
-        for error in unreachable(reports).values():
-            output.error(error)
-    poller = Poller(connection)
-    try:
-        await asyncio.Event().wait()
-    finally:
-        await poller.close()
-
-
 @contextlib.asynccontextmanager
-async def _page(arguments: argparse.Namespace, output: Output, connection: Connection) -> AsyncIterator[None]:
+async def _page(arguments: argparse.Namespace, output: Output, bench: Bench) -> AsyncIterator[None]:
     from app.scene.hub import HubScene
     from app.web.access import Access
     from app.web.app import create_app
@@ -151,7 +130,7 @@ async def _page(arguments: argparse.Namespace, output: Output, connection: Conne
     access = Access(time.monotonic)
     scene = await asyncio.to_thread(HubScene, secrets.token_urlsafe(32))
     try:
-        application = create_app(connection, access, at, scene, arguments.settings.language)
+        application = create_app(bench, access, at, scene, arguments.settings.language)
         async with serve(application, listener):
             url = launch_url(at, access.issue_token())
             output.result({"url": url}, output.texts("cli.page", url=url))

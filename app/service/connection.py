@@ -29,7 +29,8 @@ TICK_S: Final = 0.1
 class Connection:
     """From ``open`` to ``close``. Use cases take a driver and a target from here; screens read ``live``.
 
-    ``descriptions`` by id must hold every description that the turbine's devices name.
+    ``descriptions`` by id must hold every description that the turbine's devices name. ``stamper`` and ``journal`` are
+    those of the bench where connections follow one another: then time and journal go on.
     """
 
     def __init__(
@@ -39,11 +40,13 @@ class Connection:
         options: Options,
         wall_ns: Callable[[], int] = time.time_ns,
         monotonic_ns: Callable[[], int] = time.monotonic_ns,
+        stamper: Stamper | None = None,
+        journal: Journal | None = None,
     ) -> None:
         self.turbine = turbine
         self.live = LiveState()
-        self.stamper = Stamper(wall_ns(), monotonic_ns)
-        self.journal = Journal(self.stamper, options.person)
+        self.stamper = stamper or Stamper(wall_ns(), monotonic_ns)
+        self.journal = journal or Journal(self.stamper, options.person)
         self._options = options
         self._clock = RecorderClock(monotonic_ns, wall_ns, self.stamper)
         self._targets = {device.slug: self._target(device, descriptions) for device in turbine.devices}

@@ -18,6 +18,7 @@ class Kind(Enum):
     """What an event is about; the value is the end of its text key ``journal.…``."""
 
     CONNECTED = "connected"
+    DISCONNECTED = "disconnected"
     BUS_LOST = "bus_lost"
     BUS_BACK = "bus_back"
     OTHER_MASTER = "other_master"
@@ -30,6 +31,7 @@ class Kind(Enum):
     RESTART = "restart"
     STOP_SENT = "stop_sent"
     FEATHER_SENT = "feather_sent"
+    SETTINGS_CHANGED = "settings_changed"
 
     @property
     def severity(self) -> Severity:
@@ -57,38 +59,54 @@ class Entry:
         return f"journal.{self.kind.value}"
 
 
-class Journal:
-    """Keeps the latest events and tells listeners; safe from any thread. ``stamp`` gives t_ns."""
+class _Pages:
+    """What all hands of one journal share."""
 
-    def __init__(self, stamp: Callable[[], int], person: str) -> None:
+    def __init__(self) -> None:
+        self.entries: deque[Entry] = deque(maxlen=KEPT)
+        self.listeners: list[Callable[[Entry], None]] = []
+        self.lock = Lock()
+
+
+class Journal:
+    """Keeps the latest events and tells listeners; safe from any thread. ``stamp`` gives t_ns.
+
+    What is noted bears the name of ``person``; ``by`` gives the same journal in the hands of another person.
+    """
+
+    def __init__(self, stamp: Callable[[], int], person: str, pages: _Pages | None = None) -> None:
         self._stamp = stamp
         self._person = person
-        self._entries: deque[Entry] = deque(maxlen=KEPT)
-        self._listeners: list[Callable[[Entry], None]] = []
-        self._lock = Lock()
+        self._pages = pages or _Pages()
+
+    def by(self, person: str) -> Journal:
+        """The same journal, written by ``person``."""
+        return Journal(self._stamp, person, self._pages)
 
     def note(self, kind: Kind, device: str | None = None, /, **details: Any) -> None:
         """Add an event and tell everybody who listens."""
         entry = Entry(self._stamp(), kind, device, self._person, details)
-        with self._lock:
-            self._entries.append(entry)
-            listeners = tuple(self._listeners)
+        pages = self._pages
+        with pages.lock:
+            pages.entries.append(entry)
+            listeners = tuple(pages.listeners)
         for listener in listeners:
             listener(entry)
 
     def listen(self, listener: Callable[[Entry], None]) -> Callable[[], None]:
         """Have ``listener`` called with every new event; the returned function ends that."""
-        with self._lock:
-            self._listeners.append(listener)
+        pages = self._pages
+        with pages.lock:
+            pages.listeners.append(listener)
 
         def end() -> None:
-            with self._lock:
-                if listener in self._listeners:
-                    self._listeners.remove(listener)
+            with pages.lock:
+                if listener in pages.listeners:
+                    pages.listeners.remove(listener)
 
         return end
 
     def latest(self) -> list[Entry]:
         """The events kept, oldest first."""
-        with self._lock:
-            return list(self._entries)
+        with self._pages.lock:
+            return list(self._pages.entries)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Final, Literal, Protocol
 
@@ -138,6 +138,51 @@ def link_line(buses: Mapping[str, Bus], recording: RecorderStatus | None, twins:
         recording=recording_line(recording),
         other_masters=masters,
     )
+
+
+class Served(Protocol):
+    """What is needed of a bench."""
+
+    @property
+    def stamper(self) -> Callable[[], int]:
+        """Time of the bench, in ns."""
+
+    @property
+    def connection(self) -> Connected | None:
+        """The connection while there is one."""
+
+    @property
+    def twins(self) -> TwinWatch | None:
+        """Whether its devices are simulated."""
+
+
+class Connected(Protocol):
+    """What is needed of a connection."""
+
+    @property
+    def buses(self) -> Mapping[str, Bus]:
+        """Its buses by name."""
+
+    @property
+    def recording(self) -> Recorded | None:
+        """Its recording, where it is recorded."""
+
+
+class Recorded(Protocol):
+    """What is needed of a recording."""
+
+    def status(self) -> RecorderStatus:
+        """What the recorder does."""
+
+
+def bench_line(bench: Served) -> LinkLine:
+    """The state of the link now; without a connection a line that says so."""
+    now_ns = bench.stamper()
+    connection = bench.connection
+    if connection is None or bench.twins is None:
+        return link_line({}, None, False, now_ns)
+    recording = None if connection.recording is None else connection.recording.status()
+    return link_line(connection.buses, recording, bench.twins.all_twins(), now_ns)
 
 
 def link_urgent(line: LinkLine) -> tuple[object, ...]:

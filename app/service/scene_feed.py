@@ -8,8 +8,8 @@ import logging
 from collections.abc import AsyncIterator
 from typing import Final
 
-from app.scene.hub import BladePose, BladeState, HubScene
-from app.service.connection import Connection
+from app.scene.hub import BLADES, BladePose, BladeState, HubScene
+from app.service.bench import Bench
 from app.service.views import ENABLED, AxisLine, axis_lines
 
 log = logging.getLogger(__name__)
@@ -38,7 +38,7 @@ def _look(line: AxisLine) -> BladeState:
 
 
 @contextlib.asynccontextmanager
-async def run_scene(shown: Connection | None, scene: HubScene | None) -> AsyncIterator[None]:
+async def run_scene(shown: Bench | None, scene: HubScene | None) -> AsyncIterator[None]:
     """While the block runs, ``scene`` follows ``shown``; nothing where either is None."""
     if shown is None or scene is None:
         yield
@@ -51,13 +51,12 @@ async def run_scene(shown: Connection | None, scene: HubScene | None) -> AsyncIt
         await asyncio.gather(task, return_exceptions=True)
 
 
-async def follow(shown: Connection, scene: HubScene) -> None:
+async def follow(bench: Bench, scene: HubScene) -> None:
     """Show the axes for ever, thirty times a second, and only what changed. Ends by being cancelled."""
-    targets = {target.slug: target for target in shown.targets}
     before: dict[int, BladePose] = {}
     while True:
         try:
-            poses = {line.blade: pose(line) for line in axis_lines(shown.turbine, targets, shown.stamper())}
+            poses = _poses(bench)
             changed = {blade: new for blade, new in poses.items() if before.get(blade) != new}
             if changed:
                 scene.show(changed)
@@ -66,3 +65,12 @@ async def follow(shown: Connection, scene: HubScene) -> None:
             log.exception("the 3D view could not be updated")
             await asyncio.sleep(1.0)
         await asyncio.sleep(PERIOD_S)
+
+
+def _poses(bench: Bench) -> dict[int, BladePose]:
+    """All blades now; nothing is known of any where nothing is connected."""
+    shown = bench.connection
+    if shown is None:
+        return {blade: BladePose(None, BladeState.UNKNOWN, f"{blade}   –") for blade in BLADES}
+    targets = {target.slug: target for target in shown.targets}
+    return {line.blade: pose(line) for line in axis_lines(shown.turbine, targets, shown.stamper())}

@@ -10,24 +10,24 @@ from pathlib import Path
 from fastapi import FastAPI, Request, Response, WebSocket
 
 from app import __version__
+from app.model.roles import Role, SignedIn
 from app.model.texts import load_texts
 from app.scene.hub import HubScene
-from app.service.connection import Connection
+from app.service.bench import Bench
 from app.service.jobs import Jobs
-from app.service.link import TwinWatch
 from app.service.scene_feed import run_scene
 from app.web import problem
 from app.web.access import Access
 from app.web.guard import Guard
 from app.web.problem import NotFoundError
-from app.web.routes import router
+from app.web.routes import api_router
 from app.web.socket import serve_client
 from app.web.static import PageFiles, page_folder
 from app.web.viser_proxy import viser_router
 
 
 def create_app(
-    bench: Connection,
+    bench: Bench,
     access: Access,
     port: int,
     scene: HubScene | None = None,
@@ -40,7 +40,7 @@ def create_app(
 
     @app.websocket("/api/ws")
     async def socket(websocket: WebSocket) -> None:
-        await serve_client(websocket, bench, app.state.twins, time.monotonic)
+        await serve_client(websocket, bench, time.monotonic)
 
     if scene is not None:
         app.include_router(viser_router(scene))
@@ -52,10 +52,11 @@ def create_app(
             raise NotFoundError(what=request.url.path)
         return answer
 
-    return Guard(app, access, port, load_texts(language)("error.unauthorised"))
+    person = SignedIn(bench.options.person, Role.TECHNICIAN)
+    return Guard(app, access, port, load_texts(language)("error.unauthorised"), person)
 
 
-def create_api(bench: Connection | None, scene: HubScene | None = None, language: str = "en") -> FastAPI:
+def create_api(bench: Bench | None, scene: HubScene | None = None, language: str = "en") -> FastAPI:
     """The HTTP API alone; ``bench`` None serves only to write down the API's types."""
 
     @asynccontextmanager
@@ -75,8 +76,7 @@ def create_api(bench: Connection | None, scene: HubScene | None = None, language
         generate_unique_id_function=lambda route: route.name,
     )
     app.state.bench = bench
-    app.state.twins = None if bench is None else TwinWatch(bench.targets, bench.buses)
     app.state.language = language
-    app.include_router(router)
+    app.include_router(api_router())
     problem.install(app)
     return app

@@ -17,6 +17,7 @@ from typing import Any, Final
 from urllib.parse import parse_qs
 
 from app.errors import HubsideError
+from app.model.roles import SignedIn
 from app.web.access import SESSION_S, Access
 from app.web.problem import (
     MEDIA_TYPE,
@@ -34,6 +35,8 @@ Send = Callable[[Message], Awaitable[None]]
 App = Callable[[Scope, Receive, Send], Awaitable[None]]
 Headers = list[tuple[bytes, bytes]]
 
+SIGNED_IN: Final = "hubside.signed_in"
+"""Key of the scope under which an application finds who asks (``SignedIn``)."""
 LOOPBACK_NAMES: Final = ("127.0.0.1", "localhost", "[::1]")
 VISER_PATH: Final = "/viser"
 MAX_BODY: Final = 65_536
@@ -44,13 +47,17 @@ _COMMON: Final = "default-src 'self'; base-uri 'none'; form-action 'none'; objec
 
 
 class Guard:
-    """Wraps ``app``. ``port`` is ours; ``sign_in_text`` is told to a person who comes without a session."""
+    """Wraps ``app``. ``port`` is ours; ``sign_in_text`` is told to a person who comes without a session.
 
-    def __init__(self, app: App, access: Access, port: int, sign_in_text: str) -> None:
+    ``person`` is who a launch token lets in.
+    """
+
+    def __init__(self, app: App, access: Access, port: int, sign_in_text: str, person: SignedIn) -> None:
         self._app = app
         self._access = access
         self._hosts = frozenset(f"{name}:{port}" for name in LOOPBACK_NAMES)
         self._sign_in_text = sign_in_text
+        self._person = person
         # Cookies are shared by all ports of a host: a second bench on another port must not end our session.
         self._cookie = f"hubside_{port}"
 
@@ -64,6 +71,7 @@ class Guard:
         if refusal is not None:
             await _refuse(scope, headers, send, refusal)
         elif self._has_session(headers):
+            scope[SIGNED_IN] = self._person
             await self._pass(scope, receive, send, headers)
         elif session := self._new_session(scope):
             await _redirect(send, self._set_cookie(session))

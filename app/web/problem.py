@@ -25,9 +25,12 @@ MEDIA_TYPE: Final = "application/problem+json"
 _STATUS: Final[tuple[tuple[type[HubsideError], HTTPStatus], ...]] = (
     (errors.UnknownObjectError, HTTPStatus.NOT_FOUND),
     (errors.PreconditionError, HTTPStatus.CONFLICT),
+    (errors.ConflictError, HTTPStatus.CONFLICT),
     (errors.ConsentError, HTTPStatus.CONFLICT),
+    (errors.SettingsError, HTTPStatus.CONFLICT),
     (errors.RefusedError, HTTPStatus.UNPROCESSABLE_ENTITY),
     (errors.UsageError, HTTPStatus.BAD_REQUEST),
+    (errors.RecordingError, HTTPStatus.UNPROCESSABLE_ENTITY),
     (errors.BusLostError, HTTPStatus.SERVICE_UNAVAILABLE),
     (errors.BusOpenError, HTTPStatus.SERVICE_UNAVAILABLE),
     (errors.NoAnswerError, HTTPStatus.GATEWAY_TIMEOUT),
@@ -74,6 +77,8 @@ class SceneGoneError(errors.NoAnswerError):
 
 _OWN_STATUS: Final[Mapping[type[HubsideError], HTTPStatus]] = {
     NotFoundError: HTTPStatus.NOT_FOUND,
+    errors.NotConnectedError: HTTPStatus.CONFLICT,
+    errors.RoleError: HTTPStatus.FORBIDDEN,
     UnauthorisedError: HTTPStatus.UNAUTHORIZED,
     ForbiddenHostError: HTTPStatus.FORBIDDEN,
     InvalidRequestError: HTTPStatus.UNPROCESSABLE_ENTITY,

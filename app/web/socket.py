@@ -17,10 +17,11 @@ from fastapi import WebSocket, WebSocketDisconnect
 from pydantic import TypeAdapter, ValidationError
 
 from app import __version__
+from app.service.bench import Bench
 from app.service.connection import Connection
 from app.service.devices import Target
 from app.service.journal import Entry
-from app.service.link import LinkLine, TwinWatch, link_line, link_urgent
+from app.service.link import LinkLine, bench_line, link_urgent
 from app.service.views import (
     AxisLine,
     EventLine,
@@ -34,6 +35,8 @@ from app.service.views import (
 )
 from app.web.models import (
     AxesMessage,
+    BenchData,
+    BenchMessage,
     ClientMessage,
     EventMessage,
     HeartbeatMessage,
@@ -68,11 +71,12 @@ _adapter: Final[TypeAdapter[Any]] = TypeAdapter(ServerMessage)
 class Feed:
     """What one client is to be told. ``due`` gives the messages of this moment; for one thread."""
 
-    def __init__(self, bench: Connection, twins: TwinWatch) -> None:
+    def __init__(self, bench: Bench) -> None:
         self._bench = bench
-        self._twins = twins
-        self._targets: Mapping[str, Target] = {target.slug: target for target in bench.targets}
-        self._slugs = {(target.device.bus, target.node): slug for slug, target in self._targets.items()}
+        self._epoch = -1
+        self._connection: Connection | None = None
+        self._targets: Mapping[str, Target] = {}
+        self._slugs: Mapping[tuple[str, int], str] = {}
         self._topics: frozenset[str] = frozenset()
         self._devices: frozenset[str] = frozenset()
         self._fresh: set[str] = set()
@@ -85,6 +89,7 @@ class Feed:
         self._axes: tuple[AxisLine, ...] = ()
         self._nodes_urgent: tuple[Any, ...] = ()
         self._nodes_changed = False
+        self._told_events = False
         self._next: dict[str, float] = {}
 
     def close(self) -> None:
@@ -97,8 +102,13 @@ class Feed:
         Topics that do not exist are passed over.
         """
         before, self._topics = self._topics, frozenset(topics)
-        self._devices = frozenset(t.removeprefix(_VALUES) for t in topics if t.startswith(_VALUES)) & set(self._targets)
-        self._fresh = {*self._devices, *(self._topics - (before & {"events"}))}
+        self._start_over(before & {"events"})
+
+    def _start_over(self, known: frozenset[str] = frozenset()) -> None:
+        """Have the snapshots of all topics told again, but for those in ``known``."""
+        wanted = frozenset(t.removeprefix(_VALUES) for t in self._topics if t.startswith(_VALUES))
+        self._devices = wanted & set(self._targets)
+        self._fresh = {*self._devices, *(self._topics - known)}
         self._next = {}
 
     def hello(self) -> HelloMessage:
@@ -108,6 +118,8 @@ class Feed:
 
     def due(self, now_s: float) -> Iterator[ServerMessage]:
         """The messages of this moment. ``now_s`` is a monotonic time in s."""
+        if self._bench.epoch != self._epoch:
+            yield self._turn()
         changes = self._changes()
         if "link" in self._topics:
             yield from self._link_due(now_s)
@@ -123,8 +135,24 @@ class Feed:
         if self._passed("heartbeat", now_s, HEARTBEAT_S):
             yield HeartbeatMessage(seq=self._count(), t_ns=self._bench.stamper())
 
+    def _turn(self) -> BenchMessage:
+        """Another connection was made, or the one that was there ended."""
+        self._epoch, self._connection = self._bench.epoch, self._bench.connection
+        targets = () if self._connection is None else self._connection.targets
+        self._targets = {target.slug: target for target in targets}
+        self._slugs = {(target.device.bus, target.node): slug for slug, target in self._targets.items()}
+        self._cursor = self._since = 0
+        self._link, self._axes, self._nodes_urgent = None, (), ()
+        self._start_over(frozenset({"events"} if self._told_events else ()))
+        turbine = None if self._connection is None else self._connection.turbine.slug
+        return BenchMessage(
+            seq=self._count(), t_ns=self._bench.stamper(), data=BenchData(epoch=self._epoch, turbine=turbine)
+        )
+
     def _changes(self) -> Changes | None:
-        live = self._bench.live
+        if self._connection is None:
+            return None
+        live = self._connection.live
         if self._fresh:
             changes = live.changes_since(0)
         elif live.version == self._cursor:
@@ -147,7 +175,7 @@ class Feed:
     def _nodes_due(self, now_s: float) -> Iterator[ServerMessage]:
         if not self._nodes_changed and "nodes" not in self._fresh:
             return
-        lines = node_lines(self._targets.values(), self._bench.live)
+        lines = () if self._connection is None else node_lines(self._targets.values(), self._connection.live)
         urgent = nodes_urgent(lines)
         if urgent != self._nodes_urgent or self._passed("nodes", now_s, NODES_S):
             self._nodes_urgent, self._nodes_changed = urgent, False
@@ -157,7 +185,8 @@ class Feed:
         if not self._passed("axes", now_s, AXES_S):
             return
         now_ns = self._bench.stamper()
-        lines = axis_lines(self._bench.turbine, self._targets, now_ns)
+        turbine = None if self._connection is None else self._connection.turbine
+        lines = () if turbine is None else axis_lines(turbine, self._targets, now_ns)
         if lines != self._axes or "axes" in self._fresh or self._passed("axes at least", now_s, AXES_AT_LEAST_S):
             self._axes = lines
             self._next["axes at least"] = now_s + AXES_AT_LEAST_S
@@ -167,7 +196,7 @@ class Feed:
         if not self._passed("look at link", now_s, LINK_LOOK_S):
             return
         now_ns = self._bench.stamper()
-        line = link_of(self._bench, self._twins, now_ns)
+        line = bench_line(self._bench)
         changed = self._link is None or link_urgent(line) != link_urgent(self._link)
         if changed or self._passed("link", now_s, LINK_S):
             self._link = line
@@ -179,6 +208,7 @@ class Feed:
             self._journal.clear()
             return
         lines: list[EventLine] = []
+        self._told_events = True
         if "events" in self._fresh:
             self._journal.clear()
             lines += [event_of_journal(entry) for entry in self._bench.journal.latest()]
@@ -202,16 +232,10 @@ class Feed:
         return self._seq
 
 
-def link_of(bench: Connection, twins: TwinWatch, now_ns: int) -> LinkLine:
-    """The state of the link now."""
-    recording = None if bench.recording is None else bench.recording.status()
-    return link_line(bench.buses, recording, twins.all_twins(), now_ns)
-
-
-async def serve_client(socket: WebSocket, bench: Connection, twins: TwinWatch, now_s: Callable[[], float]) -> None:
+async def serve_client(socket: WebSocket, bench: Bench, now_s: Callable[[], float]) -> None:
     """Serve one page until it goes away. The guard has let it in."""
     await socket.accept()
-    feed = Feed(bench, twins)
+    feed = Feed(bench)
     tasks = [asyncio.create_task(_tell(socket, feed, now_s)), asyncio.create_task(_listen(socket, feed))]
     try:
         done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)

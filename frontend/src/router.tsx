@@ -21,8 +21,53 @@ const parametersRoute = createRoute({
   component: lazyRouteComponent(() => import("./pages/parameters/ParametersPage"), "ParametersPage"),
 });
 
+const axisRoute = createRoute({
+  getParentRoute: () => rootRoute,
+  path: "/axis",
+  component: lazyRouteComponent(() => import("./pages/axis/AxisPage"), "AxisPage"),
+});
+
+const setsRoute = createRoute({
+  getParentRoute: () => rootRoute,
+  path: "/sets",
+  component: lazyRouteComponent(() => import("./pages/sets/SetsPage"), "SetsPage"),
+});
+
+const recordingsRoute = createRoute({
+  getParentRoute: () => rootRoute,
+  path: "/recordings",
+  component: lazyRouteComponent(() => import("./pages/recordings/RecordingsPage"), "RecordingsPage"),
+});
+
+const busRoute = createRoute({
+  getParentRoute: () => rootRoute,
+  path: "/bus",
+  component: lazyRouteComponent(() => import("./pages/bus/BusPage"), "BusPage"),
+});
+
+const proceduresRoute = createRoute({
+  getParentRoute: () => rootRoute,
+  path: "/procedures",
+  component: lazyRouteComponent(() => import("./pages/procedures/ProceduresPage"), "ProceduresPage"),
+});
+
+const settingsRoute = createRoute({
+  getParentRoute: () => rootRoute,
+  path: "/settings",
+  component: lazyRouteComponent(() => import("./pages/settings/SettingsPage"), "SettingsPage"),
+});
+
 export const router = createRouter({
-  routeTree: rootRoute.addChildren([overviewRoute, parametersRoute]),
+  routeTree: rootRoute.addChildren([
+    overviewRoute,
+    axisRoute,
+    parametersRoute,
+    setsRoute,
+    recordingsRoute,
+    busRoute,
+    proceduresRoute,
+    settingsRoute,
+  ]),
   parseSearch,
   stringifySearch,
   defaultPreload: "intent",

@@ -11,14 +11,14 @@ from app.service.link import DEVICE_NAME, TwinWatch
 from app.wire.nmt import NmtState
 from tests.e2e.test_interoperation import until
 from tests.service.conftest import Served
-from tests.web.rig import BUS, Feeder, make_bench
+from tests.web.rig import BUS, Feeder, make_connection
 
 TWIN = b"HUBSIDE TWIN PMC"
 
 
 @pytest.fixture
 def bench() -> Connection:
-    return make_bench()
+    return make_connection()
 
 
 @pytest.fixture

@@ -16,7 +16,7 @@ from app.service.scene_feed import pose
 from app.wire import sdo
 from app.wire.events import EventKind
 from app.wire.nmt import NmtState
-from tests.web.rig import BUS, Feeder, make_bench
+from tests.web.rig import BUS, Feeder, make_connection
 
 PMC = "wtg-07/blade-1/pmc"
 PMM = "wtg-07/blade-1/pmm"
@@ -26,7 +26,7 @@ SECOND_NS = 1_000_000_000
 
 @pytest.fixture
 def bench() -> Connection:
-    return make_bench()
+    return make_connection()
 
 
 @pytest.fixture
@@ -113,6 +113,28 @@ def test_faults_come_from_the_error_code_or_from_an_emergency_whichever_is_newer
     assert axis(bench).fault_code == 0
     feeder.can(0x80 + 1, struct.pack("<HB5x", 0xFFFE, 1))
     assert (axis(bench).fault_code, axis(bench).fault_text_key) == (0xFFFE, None)
+
+
+def test_each_device_complains_for_itself_and_errors_come_before_warnings(bench: Connection, feeder: Feeder) -> None:
+    feeder.read(1, Address(0x3000), bytes((0b010,)))
+    feeder.read(1, Address(0x603F), struct.pack("<H", 0x4410))
+    assert [(line.device, line.code, line.severity) for line in axis(bench).faults] == [(PMM, 0x4410, "warning")]
+    feeder.read(11, Address(0x6041), struct.pack("<H", 0x0218))
+    feeder.read(11, Address(0x603F), struct.pack("<H", 0x8611))
+    assert [(line.device, line.code, line.severity) for line in axis(bench).faults] == [
+        (PMC, 0x8611, "error"),
+        (PMM, 0x4410, "warning"),
+    ]
+    assert axis(bench).fault_code == 0x8611
+    feeder.read(1, Address(0x3000), bytes((0b110,)))
+    assert [line.severity for line in axis(bench).faults] == ["error", "error"]
+
+
+def test_current_and_following_error_are_told(bench: Connection, feeder: Feeder) -> None:
+    assert (axis(bench).current_pct, axis(bench).following_error_deg) == (None, None)
+    feeder.read(11, Address(0x6078), struct.pack("<h", -123))
+    feeder.read(11, Address(0x60F4), struct.pack("<i", 150))
+    assert (axis(bench).current_pct, axis(bench).following_error_deg) == (-12.3, 1.5)
 
 
 def test_a_silent_node_is_in_no_known_state(bench: Connection, feeder: Feeder) -> None:

@@ -21,8 +21,10 @@ from app.model.description import Description
 from app.model.description_file import load_builtin
 from app.model.site import load_site
 from app.scene.hub import HubScene
+from app.service.bench import Bench
 from app.service.connection import Connection
 from app.service.options import Options
+from app.service.sites import Sites
 from app.web.access import Access
 from app.web.app import create_app
 from app.web.serve import launch_url, open_port, port_of, serve
@@ -34,10 +36,18 @@ BUS = "can0"
 DEADLINE_S = 10.0
 
 
-def make_bench() -> Connection:
+def make_connection() -> Connection:
     """The turbine of the example site; its bus is not opened, frames come from ``Feeder``."""
     (turbine,) = load_site(ROOT / "docs" / "sites" / "example.toml")
     return Connection(turbine, _descriptions(), Options(person="tester", recordings=None))
+
+
+def bench_with(connection: Connection) -> Bench:
+    """A bench that serves ``connection``."""
+    bench = Bench(Sites((connection.turbine,), lambda _turbine: _descriptions()), Options("tester", None))
+    bench.stamper, bench.journal = connection.stamper, connection.journal
+    bench.show(connection)
+    return bench
 
 
 @cache
@@ -49,12 +59,12 @@ def _descriptions() -> dict[str, Description]:
 class Feeder:
     """Puts frames on the bus of a bench, as its driver's thread does."""
 
-    bench: Connection
+    connection: Connection
 
     def can(self, can_id: int, data: bytes) -> None:
         """One frame, now."""
-        frame = Frame(self.bench.stamper(), BUS, Direction.RX, Can(can_id, data))
-        self.bench.buses[BUS].on_frames([frame])
+        frame = Frame(self.connection.stamper(), BUS, Direction.RX, Can(can_id, data))
+        self.connection.buses[BUS].on_frames([frame])
 
     def read(self, node: int, address: Address, data: bytes) -> None:
         """Somebody reads an object."""
@@ -78,7 +88,8 @@ class Server:
     port: int
     token: str
     access: Access
-    bench: Connection
+    bench: Bench
+    connection: Connection
     feeder: Feeder
     client: httpx.AsyncClient
     stranger: httpx.AsyncClient
@@ -109,10 +120,14 @@ class Server:
 
 @asynccontextmanager
 async def running(
-    bench: Connection | None = None, scene: HubScene | None = None, page: Path | None = None, signed_in: bool = True
+    connection: Connection | None = None,
+    scene: HubScene | None = None,
+    page: Path | None = None,
+    signed_in: bool = True,
 ) -> AsyncIterator[Server]:
     """Start a server; stop it at the end."""
-    bench = bench or make_bench()
+    connection = connection or make_connection()
+    bench = bench_with(connection)
     listener = open_port(0)
     port = port_of(listener)
     access = Access(time.monotonic)
@@ -126,7 +141,7 @@ async def running(
             if signed_in:
                 answer = await client.get(launch_url(port, token))
                 assert answer.status_code == 303
-            yield Server(port, token, access, bench, Feeder(bench), client, stranger)
+            yield Server(port, token, access, bench, connection, Feeder(connection), client, stranger)
 
 
 async def denied(opening: connect) -> int:

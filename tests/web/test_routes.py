@@ -132,7 +132,7 @@ async def test_stop_and_feather_reach_every_axis(server: Server) -> None:
 
 
 async def test_a_bus_that_is_gone_is_told_as_such(server: Server) -> None:
-    await server.bench.buses[BUS].driver.close()
+    await server.connection.buses[BUS].driver.close()
     answer = await server.client.post(f"{PMM}/write", json={"address": LIMIT, "raw": 490})
     assert (answer.status_code, answer.json()["code"]) == (503, "bus_lost")
     stop = await server.client.post("/api/live/stop", json={})

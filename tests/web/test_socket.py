@@ -99,7 +99,7 @@ async def test_only_what_was_asked_for_is_told(server: Server, page: Page) -> No
     server.feeder.read(2, LIMIT, struct.pack("<h", 1))
     server.feeder.read(12, POSITION, int32(1))
     await page.until("values", lambda data: "6064" in data["values"])
-    assert {m["type"] for m in page.heard} <= {"hello", "heartbeat", "values"}
+    assert {m["type"] for m in page.heard} <= {"hello", "bench", "heartbeat", "values"}
     assert {m["data"]["device"] for m in page.heard if m["type"] == "values"} == {PMC_2}
     await page.subscribe("values:wtg-07/blade-9/pmc", "nonsense")
     await page.until("heartbeat")
@@ -206,7 +206,7 @@ async def test_bytes_end_the_connection_and_are_no_defect(server: Server, caplog
 
 
 async def test_a_twin_that_restarts_stays_a_twin_on_the_page(server: Server, page: Page) -> None:
-    for target in server.bench.targets:
+    for target in server.connection.targets:
         server.feeder.read(target.node, Address(0x1008), b"HUBSIDE TWIN")
     await page.subscribe("link", "nodes")
     assert (await page.until("link"))["data"]["mode"] == "twin"
@@ -251,7 +251,7 @@ def narrow_socket(port: int) -> socket.socket:
 
 async def test_a_slow_client_holds_up_nobody_and_gets_the_latest(server: Server, page: Page) -> None:
     """It stops reading while values change without end; the other page goes on, and what waits for it is bounded."""
-    target = server.bench.target(PMC_2)
+    target = server.connection.target(PMC_2)
     entries = [e for e in target.description if e.type.size == 4 and e.address.major >= 0x5000]
     topic = f"values:{PMC_2}"
     narrow: dict[str, Any] = {"host": None, "port": None, "sock": narrow_socket(server.port)}
@@ -277,7 +277,7 @@ async def test_a_slow_client_holds_up_nobody_and_gets_the_latest(server: Server,
 
 
 async def test_a_page_that_leaves_is_forgotten(server: Server) -> None:
-    listeners = server.bench.journal._listeners
+    listeners = server.bench.journal._pages.listeners
     for _ in range(3):
         async with server.socket() as connection:
             page = Page(connection)

@@ -4,6 +4,26 @@
  */
 
 export interface paths {
+    "/api/live/connect": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Connect
+         * @description Connect to a turbine; the connection that there is ends first.
+         */
+        post: operations["connect"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/live/descriptions/{description_id}": {
         parameters: {
             query?: never;
@@ -95,9 +115,29 @@ export interface paths {
         put?: never;
         /**
          * Write
-         * @description Check, write once, read back.
+         * @description Check, write once, read back. What only the maker sets needs an expert.
          */
         post: operations["write"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/live/disconnect": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Disconnect
+         * @description End the connection and its recording.
+         */
+        post: operations["disconnect"];
         delete?: never;
         options?: never;
         head?: never;
@@ -177,7 +217,7 @@ export interface paths {
         };
         /**
          * Turbine
-         * @description The connected turbine with its stations and devices.
+         * @description The connected turbine with its stations and devices; null where none is connected.
          */
         get: operations["turbine"];
         put?: never;
@@ -220,6 +260,26 @@ export interface paths {
          * @description All texts for people in one language, by key.
          */
         get: operations["texts"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/turbines": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Turbines
+         * @description All turbines that the bench knows, and which of them is connected.
+         */
+        get: operations["turbines"];
         put?: never;
         post?: never;
         delete?: never;
@@ -283,7 +343,8 @@ export interface components {
          * AxisLine
          * @description One blade. ``state`` and ``fault_text_key`` are text keys; ``fault_code`` 0 is no fault, None not known.
          *
-         *     ``demand_deg`` is None while the axis does not follow a target position.
+         *     ``fault_code`` is that of the worst of ``faults``. ``demand_deg`` is None while the axis does not follow a target
+         *     position. ``current_pct`` is in per cent of the rated current.
          *     ``stale``: the position is not known, older than a second, or its node is silent.
          */
         AxisLine: {
@@ -293,6 +354,8 @@ export interface components {
             battery_v: number | null;
             /** Blade */
             blade: number;
+            /** Current Pct */
+            current_pct: number | null;
             /** Dc Link V */
             dc_link_v: number | null;
             /** Demand Deg */
@@ -301,6 +364,10 @@ export interface components {
             fault_code: number | null;
             /** Fault Text Key */
             fault_text_key: string | null;
+            /** Faults */
+            faults: components["schemas"]["FaultLine"][];
+            /** Following Error Deg */
+            following_error_deg: number | null;
             /** Position Deg */
             position_deg: number | null;
             /** Position T Ns */
@@ -313,6 +380,44 @@ export interface components {
             station: string;
             /** Velocity Dps */
             velocity_dps: number | null;
+        };
+        /**
+         * BenchData
+         * @description What is connected; ``epoch`` is raised with every connection that is made or ended.
+         */
+        BenchData: {
+            /** Epoch */
+            epoch: number;
+            /** Turbine */
+            turbine: string | null;
+        };
+        /**
+         * BenchMessage
+         * @description Always, first and whenever it changes: all that was told of another connection is void.
+         */
+        BenchMessage: {
+            /**
+             * Ctx
+             * @default live
+             * @constant
+             */
+            ctx: "live";
+            data: components["schemas"]["BenchData"];
+            /** Seq */
+            seq: number;
+            /** T Ns */
+            t_ns: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            type: "bench";
+            /**
+             * V
+             * @default 1
+             * @constant
+             */
+            v: 1;
         };
         /**
          * BusRef
@@ -338,6 +443,14 @@ export interface components {
              * @constant
              */
             type: "subscribe";
+        };
+        /**
+         * ConnectRequest
+         * @description ``turbine`` is the slug of one that is known.
+         */
+        ConnectRequest: {
+            /** Turbine */
+            turbine: string;
         };
         /**
          * DeviceRef
@@ -417,6 +530,23 @@ export interface components {
             };
             /** Text Key */
             text_key: string;
+        };
+        /**
+         * FaultLine
+         * @description What a device complains of. ``text_key`` None: its description does not know the code.
+         */
+        FaultLine: {
+            /** Code */
+            code: number;
+            /** Device */
+            device: string;
+            /**
+             * Severity
+             * @enum {string}
+             */
+            severity: "warning" | "error";
+            /** Text Key */
+            text_key: string | null;
         };
         /**
          * HeartbeatMessage
@@ -508,6 +638,20 @@ export interface components {
             state: "running" | "done" | "failed" | "cancelled";
             /** Total */
             total: number;
+        };
+        /**
+         * KnownTurbine
+         * @description A turbine of the site file; ``buses`` are the adapters that it is reached by.
+         */
+        KnownTurbine: {
+            /** Buses */
+            buses: string[];
+            /** Connected */
+            connected: boolean;
+            /** Name */
+            name: string;
+            /** Slug */
+            slug: string;
         };
         /**
          * LinkLine
@@ -714,10 +858,10 @@ export interface components {
             /** Took S */
             took_s: number;
         };
-        ServerMessage: components["schemas"]["HelloMessage"] | components["schemas"]["HeartbeatMessage"] | components["schemas"]["LinkMessage"] | components["schemas"]["NodesMessage"] | components["schemas"]["AxesMessage"] | components["schemas"]["ValuesMessage"] | components["schemas"]["EventMessage"];
+        ServerMessage: components["schemas"]["HelloMessage"] | components["schemas"]["BenchMessage"] | components["schemas"]["HeartbeatMessage"] | components["schemas"]["LinkMessage"] | components["schemas"]["NodesMessage"] | components["schemas"]["AxesMessage"] | components["schemas"]["ValuesMessage"] | components["schemas"]["EventMessage"];
         /**
          * Session
-         * @description Who is served, and in which languages.
+         * @description Who is served, and in which languages. ``user`` is null where a launch token opened the session.
          */
         Session: {
             /** Languages */
@@ -727,11 +871,15 @@ export interface components {
              * @enum {string}
              */
             locale: "en" | "de";
+            /** Person */
+            person: string;
             /**
              * Role
              * @enum {string}
              */
             role: "viewer" | "technician" | "expert";
+            /** User */
+            user: string | null;
             /** Version */
             version: string;
         };
@@ -888,6 +1036,40 @@ export interface components {
 }
 export type $defs = Record<string, never>;
 export interface operations {
+    connect: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["ConnectRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Turbine"];
+                };
+            };
+            /** @description What went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                    "application/problem+json": unknown;
+                };
+            };
+        };
+    };
     description: {
         parameters: {
             query?: never;
@@ -1074,6 +1256,40 @@ export interface operations {
             };
         };
     };
+    disconnect: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["Nothing"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Nothing"];
+                };
+            };
+            /** @description What went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                    "application/problem+json": unknown;
+                };
+            };
+        };
+    };
     feather: {
         parameters: {
             query?: never;
@@ -1221,7 +1437,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": components["schemas"]["Turbine"];
+                    "application/json": components["schemas"]["Turbine"] | null;
                 };
             };
             /** @description What went wrong */
@@ -1286,6 +1502,36 @@ export interface operations {
                     "application/json": {
                         [key: string]: string;
                     };
+                };
+            };
+            /** @description What went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                    "application/problem+json": unknown;
+                };
+            };
+        };
+    };
+    turbines: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["KnownTurbine"][];
                 };
             };
             /** @description What went wrong */

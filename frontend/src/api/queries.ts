@@ -28,7 +28,8 @@ export const textsQuery = (language: Language) =>
 
 export const turbineQuery = queryOptions({
   queryKey: ["turbine"],
-  queryFn: ({ signal }) => get<Turbine>("/api/live/turbine", signal),
+  queryFn: ({ signal }) => get<Turbine | null>("/api/live/turbine", signal),
+  select: (turbine) => turbine ?? undefined,
 });
 
 export const descriptionQuery = (id: string) =>

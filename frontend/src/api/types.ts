@@ -21,6 +21,7 @@ export type RestartResult = Schemas["RestartDone"];
 export type StopResult = Schemas["StopDone"];
 
 export type ServerMessage = Schemas["ServerMessage"];
+export type BenchData = Schemas["BenchData"];
 export type LinkData = Schemas["LinkLine"];
 export type RecordingStatus = Schemas["RecordingLine"];
 export type NodeData = Schemas["NodeLine"];

@@ -1,4 +1,13 @@
-import { IconAdjustmentsHorizontal, IconLayoutDashboard } from "@tabler/icons-react";
+import {
+  IconAdjustmentsHorizontal,
+  IconChecklist,
+  IconFiles,
+  IconLayoutDashboard,
+  IconMovie,
+  IconRotateClockwise2,
+  IconSettings,
+  IconTopologyBus,
+} from "@tabler/icons-react";
 import { Link } from "@tanstack/react-router";
 import { useTexts } from "../texts/texts";
 import classes from "./Frame.module.css";
@@ -6,10 +15,16 @@ import { type PageSearch, readSearch } from "./search";
 
 const ROOMS = [
   { to: "/", key: "overview", Icon: IconLayoutDashboard },
+  { to: "/axis", key: "axis", Icon: IconRotateClockwise2 },
   { to: "/parameters", key: "parameters", Icon: IconAdjustmentsHorizontal },
+  { to: "/sets", key: "sets", Icon: IconFiles },
+  { to: "/recordings", key: "recordings", Icon: IconMovie },
+  { to: "/bus", key: "bus", Icon: IconTopologyBus },
+  { to: "/procedures", key: "procedures", Icon: IconChecklist },
+  { to: "/settings", key: "settings", Icon: IconSettings },
 ] as const;
 
-/** The rooms that exist; the rest of the search, device and filter too, goes along. */
+/** The rooms; the rest of the search, device and filter too, goes along. */
 export function Navigation() {
   const t = useTexts();
   return (

@@ -2,9 +2,9 @@ import { Center, Loader, MantineProvider } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { useEffect, useMemo } from "react";
 import { Problem } from "../api/client";
-import { sessionQuery, textsQuery } from "../api/queries";
+import { queryClient, sessionQuery, textsQuery, turbineQuery } from "../api/queries";
 import type { Language } from "../api/types";
-import { startLive } from "../live/live";
+import { startLive, useBench } from "../live/live";
 import { bootTranslator, TextsContext, translator } from "../texts/texts";
 import { Frame } from "./Frame";
 import { NoAccess } from "./NoAccess";
@@ -40,6 +40,10 @@ function Gate({ wanted }: { wanted: Language | undefined }) {
   useEffect(() => {
     document.documentElement.lang = language;
   }, [language]);
+  const epoch = useBench()?.epoch;
+  useEffect(() => {
+    void queryClient.invalidateQueries({ queryKey: turbineQuery.queryKey });
+  }, [epoch]);
   useEffect(() => {
     if (session.isSuccess) startLive();
   }, [session.isSuccess]);

@@ -26,6 +26,7 @@ function useTopic<T>(topic: string, read: () => T): T {
 }
 
 export const useHearing = () => useTopic("hearing", () => store.hearing);
+export const useBench = () => useTopic("bench", () => store.bench);
 export const useLink = () => useTopic("link", () => store.link);
 export const useNodes = () => useTopic("nodes", () => store.nodes);
 export const useAxes = () => useTopic("axes", () => store.axes);

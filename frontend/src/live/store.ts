@@ -2,11 +2,12 @@
  * What the page knows of the bench, fed by the socket alone.
  *
  * Messages are taken in at once but shown coalesced: listeners of a topic are told at most once a tick of `schedule`
- * (an animation frame in the browser), however many messages came. Topics: "hearing", "link", "nodes", "axes", "events",
+ * (an animation frame in the browser), however many messages came. Topics: "hearing", "bench", "link", "nodes", "axes", "events",
  * "device:<slug>" and "value:<slug>/<address>".
  */
 import type {
   AxisData,
+  BenchData,
   EventData,
   LinkData,
   NodeData,
@@ -39,6 +40,7 @@ type Listener = () => void;
 
 export class LiveStore {
   hearing: HearingState = { state: "connecting", sinceMs: null };
+  bench: BenchData | null = null;
   link: LinkData | null = null;
   nodes: ReadonlyMap<string, NodeData> = new Map();
   axes: ReadonlyMap<number, AxisData> = new Map();
@@ -101,6 +103,8 @@ export class LiveStore {
       case "hello":
       case "heartbeat":
         return;
+      case "bench":
+        return this.applyBench(message.data);
       case "link":
         this.link = message.data;
         this.loadHistory = [...this.loadHistory, message.data.load].slice(-LOAD_HISTORY);
@@ -115,6 +119,19 @@ export class LiveStore {
       case "event":
         return this.applyEvent(message.data);
     }
+  }
+
+  /** Another connection: whatever was known of the one before is void. */
+  private applyBench(bench: BenchData): void {
+    const another = this.bench !== null && this.bench.epoch !== bench.epoch;
+    this.bench = bench;
+    this.mark("bench");
+    if (!another) return;
+    this.nodes = new Map();
+    this.axes = new Map();
+    this.traces.clear();
+    for (const topic of ["nodes", "axes"]) this.mark(topic);
+    for (const device of [...this.devices.keys()]) this.applyValues({ device, full: true, values: {} });
   }
 
   private applyAxes(axes: AxisData[], tNs: number): void {

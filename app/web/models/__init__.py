@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, StrictFloat, StrictInt, Stric
 from app.service.link import LinkLine, Mode
 from app.service.views import AxisLine, EventLine, NodeLine, RawJson, ValueCell
 
+RoleName = Literal["viewer", "technician", "expert"]
 Language = Literal["en", "de"]
 API_VERSION: Literal[1] = 1
 
@@ -26,10 +27,12 @@ class Problem(BaseModel):
 
 
 class Session(BaseModel):
-    """Who is served, and in which languages."""
+    """Who is served, and in which languages. ``user`` is null where a launch token opened the session."""
 
     version: str
-    role: Literal["viewer", "technician", "expert"]
+    role: RoleName
+    person: str
+    user: str | None
     languages: list[Language]
     locale: Language
 
@@ -70,6 +73,23 @@ class Turbine(BaseModel):
     stations: list[StationRef]
 
 
+class KnownTurbine(BaseModel):
+    """A turbine of the site file; ``buses`` are the adapters that it is reached by."""
+
+    slug: str
+    name: str
+    buses: list[str]
+    connected: bool
+
+
+class ConnectRequest(BaseModel):
+    """``turbine`` is the slug of one that is known."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    turbine: Annotated[str, Field(max_length=200)]
+
+
 class ReadRequest(BaseModel):
     """``addresses`` null reads all readable objects."""
 
@@ -98,8 +118,23 @@ class Failure(BaseModel):
     details: dict[str, Any]
 
 
+class JobRowDoc(BaseModel):
+    """One object of a job that writes.
+
+    ``was_raw`` and ``read_raw`` are what RAM held before and after. "unproven": acknowledged, but only an effect would
+    prove it; "not_saved": verified in RAM, but the save was not acknowledged.
+    """
+
+    device: str
+    address: str
+    state: Literal["waiting", "sent", "verified", "unproven", "saving", "saved", "refused", "not_saved"]
+    was_raw: RawJson | None
+    read_raw: RawJson | None
+    error: Failure | None
+
+
 class JobDoc(BaseModel):
-    """Work that runs in the background. ``error`` says why it failed as a whole."""
+    """Work that runs in the background. ``error`` says why it failed as a whole; ``rows`` are those of a write."""
 
     id: str
     kind: str
@@ -109,6 +144,7 @@ class JobDoc(BaseModel):
     total: int
     failed: list[Failure]
     error: Failure | None
+    rows: list[JobRowDoc]
 
 
 class WriteDone(BaseModel):
@@ -202,6 +238,20 @@ class LinkMessage(_Envelope):
     data: LinkLine
 
 
+class BenchData(BaseModel):
+    """What is connected; ``epoch`` is raised with every connection that is made or ended."""
+
+    epoch: int
+    turbine: str | None
+
+
+class BenchMessage(_Envelope):
+    """Always, first and whenever it changes: all that was told of another connection is void."""
+
+    type: Literal["bench"] = "bench"
+    data: BenchData
+
+
 class NodesMessage(_Envelope):
     """Topic ``nodes``: all devices, where one changed."""
 
@@ -231,7 +281,14 @@ class EventMessage(_Envelope):
 
 
 ServerMessage = Annotated[
-    HelloMessage | HeartbeatMessage | LinkMessage | NodesMessage | AxesMessage | ValuesMessage | EventMessage,
+    HelloMessage
+    | BenchMessage
+    | HeartbeatMessage
+    | LinkMessage
+    | NodesMessage
+    | AxesMessage
+    | ValuesMessage
+    | EventMessage,
     Field(discriminator="type"),
 ]
 """What the socket sends."""

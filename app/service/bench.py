@@ -1,0 +1,128 @@
+"""The bench: what one server serves. Turbines that it knows, and the connection to one of them while there is one."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Final
+
+from app.errors import BusLostError, HubsideError, NotConnectedError
+from app.service.as_found import read_as_found, unreachable
+from app.service.bitrates import with_bitrates
+from app.service.connection import Connection
+from app.service.journal import Journal, Kind
+from app.service.link import TwinWatch
+from app.service.options import Options
+from app.service.poll import Poller
+from app.service.sites import Sites
+from app.wire.frame import Stamper
+
+log = logging.getLogger(__name__)
+
+CONNECT_TIMEOUT_S: Final = 10.0
+
+Told = Callable[[HubsideError], None]
+
+
+def _log(error: HubsideError) -> None:
+    log.warning("%s: %s", error.code, error)
+
+
+class Bench:
+    """Connections follow one another; time, journal and the people at work go on. Lives in the event loop.
+
+    ``told`` hears of devices that could not be read after a connection was made. ``epoch`` is raised with every
+    connection that is made or ended, so that whoever shows the live state knows that it is another one.
+    """
+
+    def __init__(
+        self,
+        sites: Sites,
+        options: Options,
+        told: Told = _log,
+        wall_ns: Callable[[], int] = time.time_ns,
+        monotonic_ns: Callable[[], int] = time.monotonic_ns,
+    ) -> None:
+        self.sites = sites
+        self.options = options
+        self.stamper = Stamper(wall_ns(), monotonic_ns)
+        self.journal = Journal(self.stamper, options.person)
+        self.connection: Connection | None = None
+        self.twins: TwinWatch | None = None
+        self.epoch = 0
+        self._told = told
+        self._clocks = wall_ns, monotonic_ns
+        self._changing = asyncio.Lock()
+        self._look: asyncio.Task[None] | None = None
+
+    def require(self) -> Connection:
+        """The connection. Raises NotConnectedError."""
+        if self.connection is None:
+            raise NotConnectedError
+        return self.connection
+
+    async def connect(self, slug: str, person: str, timeout_s: float = CONNECT_TIMEOUT_S) -> Connection:
+        """End the connection that there is, and connect to the turbine ``slug``.
+
+        Raises UsageError, DescriptionError, BusOpenError; then nothing is connected.
+        """
+        turbine = self.sites.turbine(slug)
+        descriptions = self.sites.describe(turbine)
+        async with self._changing:
+            await self._end(person)
+            found = await with_bitrates(turbine, self.options.listen_s)
+            journal = self.journal.by(person)
+            options = replace(self.options, person=person)
+            connection = Connection(found, descriptions, options, *self._clocks, self.stamper, journal)
+            await connection.open(timeout_s)
+            self.show(connection)
+            self._look = asyncio.create_task(self._first_look(connection, person))
+            return connection
+
+    def show(self, connection: Connection) -> None:
+        """Have ``connection``, which is open, as the one that is served."""
+        self.twins = TwinWatch(connection.targets, connection.buses)
+        self.connection = connection
+        self.epoch += 1
+
+    async def disconnect(self, person: str) -> None:
+        """End the connection; the recording is finished. Nothing happens where there is none."""
+        async with self._changing:
+            await self._end(person)
+
+    async def close(self) -> None:
+        """End the connection at the end of the server."""
+        await self.disconnect(self.options.person)
+
+    async def _end(self, person: str) -> None:
+        connection = self.connection
+        if connection is None:
+            return
+        if self._look is not None:
+            self._look.cancel()
+            await asyncio.gather(self._look, return_exceptions=True)
+            self._look = None
+        self.connection, self.twins = None, None
+        self.epoch += 1
+        self.journal.by(person).note(Kind.DISCONNECTED, None, turbine=connection.turbine.name)
+        await connection.close()
+
+    async def _first_look(self, connection: Connection, person: str) -> None:
+        """Read everything once, then keep polling what the screens need."""
+        try:
+            reports = await read_as_found(connection, person)
+        except* BusLostError as lost:
+            for reason in lost.exceptions:
+                if isinstance(reason, BusLostError):
+                    self._told(reason)
+        else:
+            for error in unreachable(reports).values():
+                self._told(error)
+        poller = Poller(connection)
+        try:
+            await asyncio.Event().wait()
+        finally:
+            await poller.close()

@@ -1,0 +1,30 @@
+"""A batch of changes, as the page sends it once it was reviewed."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, StrictFloat, StrictInt, StrictStr
+
+RawIn = StrictInt | StrictFloat | Annotated[StrictStr, Field(max_length=60_000)]
+
+
+class WritesRow(BaseModel):
+    """One object. ``expected_raw`` is what RAM held when the change was made; null leaves that unchecked."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    device: Annotated[str, Field(max_length=200)]
+    address: Annotated[str, Field(max_length=40)]
+    raw: RawIn
+    expected_raw: RawIn | None = None
+
+
+class WritesRequest(BaseModel):
+    """``save`` makes each device's values permanent that has verified writes; with "stop" nothing follows a failure."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    rows: Annotated[list[WritesRow], Field(min_length=1, max_length=500)]
+    save: bool
+    on_failure: Literal["stop", "go-on"] = "stop"

@@ -1,0 +1,81 @@
+"""Turbines that are known, the one that is connected, and the descriptions of its devices."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fastapi import APIRouter
+
+from app.model.od_export import description_dict
+from app.model.roles import Role
+from app.model.site import Turbine as SiteTurbine
+from app.service.bench import Bench
+from app.service.link import bench_line
+from app.web.deps import BenchOf, ConnectionOf, PersonOf, needs
+from app.web.models import BusRef, ConnectRequest, DeviceRef, KnownTurbine, Nothing, StationRef, Turbine
+from app.web.problem import NotFoundError
+
+router = APIRouter()
+
+
+@router.get("/turbines")
+async def turbines(bench: BenchOf) -> list[KnownTurbine]:
+    """All turbines that the bench knows, and which of them is connected."""
+    connected = None if bench.connection is None else bench.connection.turbine.slug
+    return [
+        KnownTurbine(
+            slug=one.slug, name=one.name, buses=[bus.connection for bus in one.buses], connected=slug == connected
+        )
+        for slug, one in bench.sites.turbines.items()
+    ]
+
+
+@router.post("/live/connect", dependencies=[needs(Role.TECHNICIAN)])
+async def connect(bench: BenchOf, person: PersonOf, request: ConnectRequest) -> Turbine:
+    """Connect to a turbine; the connection that there is ends first."""
+    if request.turbine not in bench.sites.turbines:
+        raise NotFoundError(what=request.turbine)
+    await bench.connect(request.turbine, person.person)
+    return _turbine(bench, bench.require().turbine)
+
+
+@router.post("/live/disconnect", dependencies=[needs(Role.TECHNICIAN)])
+async def disconnect(bench: BenchOf, person: PersonOf, _request: Nothing) -> Nothing:
+    """End the connection and its recording."""
+    await bench.disconnect(person.person)
+    return Nothing()
+
+
+@router.get("/live/turbine")
+async def turbine(bench: BenchOf) -> Turbine | None:
+    """The connected turbine with its stations and devices; null where none is connected."""
+    return None if bench.connection is None else _turbine(bench, bench.connection.turbine)
+
+
+def _turbine(bench: Bench, site: SiteTurbine) -> Turbine:
+    link = bench_line(bench)
+    connection = bench.require()
+    adapter = connection.buses[link.bus].adapter if link.bus else ""
+    stations = [
+        StationRef(
+            slug=station.slug,
+            name=station.name,
+            blade=station.blade,
+            devices=[
+                DeviceRef(slug=one.slug, node=one.node, description_id=one.description_id, name=one.name)
+                for one in station.devices
+            ],
+        )
+        for station in site.stations
+    ]
+    bus = BusRef(name=link.bus, bitrate=link.bitrate, interface=adapter)
+    return Turbine(slug=site.slug, name=site.name, mode=link.mode, bus=bus, stations=stations)
+
+
+@router.get("/live/descriptions/{description_id}")
+async def description(connection: ConnectionOf, description_id: str) -> dict[str, Any]:
+    """Everything that is known of a device's objects."""
+    found = next((one.description for one in connection.targets if one.description.id == description_id), None)
+    if found is None:
+        raise NotFoundError(what=description_id)
+    return description_dict(found)

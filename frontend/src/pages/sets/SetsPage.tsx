@@ -1,0 +1,6 @@
+import { useTexts } from "../../texts/texts";
+
+export function SetsPage() {
+  const t = useTexts();
+  return <h1>{t("page.rooms.sets")}</h1>;
+}
