@@ -128,6 +128,7 @@ def options_of(arguments: argparse.Namespace, record: bool) -> Options:
         recordings=settings.recordings if record else None,
         consent=arguments.consent,
         listen_s=arguments.listen_s,
+        data=settings.data,
     )
 
 

@@ -107,6 +107,26 @@ def to_set(report: ReadReport, turbine: str, person: str, reason: str, wall_ns: 
     )
 
 
+@dataclass(frozen=True, slots=True)
+class Kept:
+    """What became of one device: ``file`` None where nothing whole was read, and ``report`` says why."""
+
+    report: ReadReport
+    file: Path | None
+
+
+def keep_sets(
+    reports: Iterable[ReadReport], folder: Path, turbine: str, person: str, reason: str, wall_ns: int
+) -> list[Kept]:
+    """Write a set file of every device that was read; of one that was lost on the way none is written."""
+    kept = []
+    for report in reports:
+        whole = bool(report.values) and report.lost is None
+        path = write_set(folder / turbine, to_set(report, turbine, person, reason, wall_ns)) if whole else None
+        kept.append(Kept(report, path))
+    return kept
+
+
 def is_empty(error: HubsideError) -> bool:
     """True where the device answered that the object holds no data, as an empty error history does."""
     return isinstance(error, SdoAbortError) and error.abort_code == Abort.NO_DATA

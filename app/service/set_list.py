@@ -39,7 +39,7 @@ class SetFiles:
     """The sets of one folder and of the folders in it, one a turbine."""
 
     def __init__(self, folder: Path) -> None:
-        self._list = FileList(folder, "**/*.json", look_at)
+        self._list = FileList(folder, "*/*.json", look_at)
 
     @property
     def folder(self) -> Path:
