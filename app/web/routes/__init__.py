@@ -7,7 +7,7 @@ from fastapi import APIRouter
 from app.web.deps import ANY_PROBLEM
 from app.web.routes import devices, jobs, recordings, session, sets, stop, turbine, writes
 
-FEATURES = (session, turbine, devices, jobs, stop, writes)
+FEATURES = (session, turbine, devices, jobs, stop, writes, recordings, sets)
 
 
 def api_router() -> APIRouter:
