@@ -4,6 +4,26 @@
  */
 
 export interface paths {
+    "/api/live/backup": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Backup
+         * @description Read every device of the turbine completely in the background, and keep a set of each.
+         */
+        post: operations["backup"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/live/connect": {
         parameters: {
             query?: never;
@@ -228,6 +248,106 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/live/writes": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Writes
+         * @description Check, write, read back and save in the background. What only the maker sets needs an expert.
+         */
+        post: operations["writes"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/recordings": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Recordings
+         * @description The recordings, latest first. Those of state ``unread`` are filled in by the next requests.
+         */
+        get: operations["recordings"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/recordings/{name}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Recording
+         * @description What one recording holds beside its frames; of the one that is being written only where it lies.
+         */
+        get: operations["recording"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/recordings/{name}/attachment": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Download Attachment
+         * @description A file inside a recording, a parameter set for example.
+         */
+        get: operations["download_attachment"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/recordings/{name}/download": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Download Recording
+         * @description The file; of the one that is being written what it holds now.
+         */
+        get: operations["download_recording"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/session": {
         parameters: {
             query?: never;
@@ -240,6 +360,66 @@ export interface paths {
          * @description Who is served, and in which languages.
          */
         get: operations["session"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/sets": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Sets
+         * @description The set files, latest first. Those without head and reason are filled in by the next requests.
+         */
+        get: operations["sets"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/sets/{turbine}/{file}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Parameter Set
+         * @description One set with all its values.
+         */
+        get: operations["parameter_set"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/sets/{turbine}/{file}/download": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Download Set
+         * @description The set file as it is.
+         */
+        get: operations["download_set"];
         put?: never;
         post?: never;
         delete?: never;
@@ -292,6 +472,18 @@ export interface paths {
 export type webhooks = Record<string, never>;
 export interface components {
     schemas: {
+        /**
+         * AttachmentRef
+         * @description A file inside a recording.
+         */
+        AttachmentRef: {
+            /** Media Type */
+            media_type: string;
+            /** Name */
+            name: string;
+            /** Size Bytes */
+            size_bytes: number;
+        };
         /**
          * AxesMessage
          * @description Topic ``axes``: all blades, where one changed, at most 20 times a second and at least once.
@@ -382,6 +574,17 @@ export interface components {
             velocity_dps: number | null;
         };
         /**
+         * BackupRequest
+         * @description ``reason`` is kept in the sets.
+         */
+        BackupRequest: {
+            /**
+             * Reason
+             * @default
+             */
+            reason: string;
+        };
+        /**
          * BenchData
          * @description What is connected; ``epoch`` is raised with every connection that is made or ended.
          */
@@ -451,6 +654,20 @@ export interface components {
         ConnectRequest: {
             /** Turbine */
             turbine: string;
+        };
+        /**
+         * DamageRef
+         * @description A stretch of a file that cannot be used.
+         */
+        DamageRef: {
+            /** Detail */
+            detail: string;
+            /** Length */
+            length: number;
+            /** Offset */
+            offset: number;
+            /** Reason */
+            reason: string;
         };
         /**
          * DeviceRef
@@ -617,7 +834,7 @@ export interface components {
         };
         /**
          * JobDoc
-         * @description Work that runs in the background. ``error`` says why it failed as a whole.
+         * @description Work that runs in the background. ``error`` says why it failed as a whole; ``rows`` are those of a write.
          */
         JobDoc: {
             /** Device */
@@ -631,6 +848,8 @@ export interface components {
             id: string;
             /** Kind */
             kind: string;
+            /** Rows */
+            rows: components["schemas"]["JobRowDoc"][];
             /**
              * State
              * @enum {string}
@@ -638,6 +857,29 @@ export interface components {
             state: "running" | "done" | "failed" | "cancelled";
             /** Total */
             total: number;
+        };
+        /**
+         * JobRowDoc
+         * @description One object of a job that writes.
+         *
+         *     ``was_raw`` and ``read_raw`` are what RAM held before and after. "unproven": acknowledged, but only an effect would
+         *     prove it; "not_saved": verified in RAM, but the save was not acknowledged.
+         */
+        JobRowDoc: {
+            /** Address */
+            address: string;
+            /** Device */
+            device: string;
+            error: components["schemas"]["Failure"] | null;
+            /** Read Raw */
+            read_raw: number | string | null;
+            /**
+             * State
+             * @enum {string}
+             */
+            state: "waiting" | "sent" | "verified" | "unproven" | "saving" | "saved" | "refused" | "not_saved";
+            /** Was Raw */
+            was_raw: number | string | null;
         };
         /**
          * KnownTurbine
@@ -711,6 +953,20 @@ export interface components {
              * @constant
              */
             v: 1;
+        };
+        /**
+         * LossRef
+         * @description An event that tells of frames that are missing; ``text_key`` with ``details`` is its text.
+         */
+        LossRef: {
+            /** Details */
+            details: {
+                [key: string]: unknown;
+            };
+            /** T Ns */
+            t_ns: number;
+            /** Text Key */
+            text_key: string;
         };
         /**
          * MasterLine
@@ -816,6 +1072,38 @@ export interface components {
             addresses?: string[] | null;
         };
         /**
+         * RecordingDoc
+         * @description What one file holds beside its frames.
+         */
+        RecordingDoc: {
+            /** Attachments */
+            attachments: components["schemas"]["AttachmentRef"][];
+            /** Damages */
+            damages: components["schemas"]["DamageRef"][];
+            /** Losses */
+            losses: components["schemas"]["LossRef"][];
+            /** Metadata */
+            metadata: {
+                [key: string]: {
+                    [key: string]: string;
+                };
+            };
+            /** Name */
+            name: string;
+            /** Path */
+            path: string;
+            /**
+             * State
+             * @enum {string}
+             */
+            state: "live" | "finished" | "unfinished" | "unreadable" | "unread";
+            summary: components["schemas"]["RecordingSummary"] | null;
+            /** Topics */
+            topics: {
+                [key: string]: number;
+            };
+        };
+        /**
          * RecordingLine
          * @description The recording: ``reason`` is a text key, given where it stands still or lost frames.
          */
@@ -837,6 +1125,62 @@ export interface components {
              * @enum {string}
              */
             state: "on" | "off" | "stopped";
+        };
+        /**
+         * RecordingList
+         * @description The recordings of the data folder. ``free_bytes`` null: the folder does not exist yet.
+         */
+        RecordingList: {
+            /** Files */
+            files: components["schemas"]["RecordingRef"][];
+            /** Folder */
+            folder: string;
+            /** Free Bytes */
+            free_bytes: number | null;
+        };
+        /**
+         * RecordingRef
+         * @description One file. ``unread``: it was not looked into yet, ask again; ``reason`` says why it cannot be read.
+         */
+        RecordingRef: {
+            /** Modified Ns */
+            modified_ns: number;
+            /** Name */
+            name: string;
+            /** Reason */
+            reason: string | null;
+            /** Size Bytes */
+            size_bytes: number;
+            /**
+             * State
+             * @enum {string}
+             */
+            state: "live" | "finished" | "unfinished" | "unreadable" | "unread";
+            summary: components["schemas"]["RecordingSummary"] | null;
+        };
+        /**
+         * RecordingSummary
+         * @description What a file says of itself. ``frames`` and ``events`` are its own; ``lost`` is of its recording so far.
+         */
+        RecordingSummary: {
+            /** Events */
+            events: number;
+            /** First Ns */
+            first_ns: number | null;
+            /** Frames */
+            frames: number;
+            /** Last Ns */
+            last_ns: number | null;
+            /** Lost */
+            lost: number | null;
+            /** Part */
+            part: number;
+            /** Person */
+            person: string;
+            /** Started Ns */
+            started_ns: number | null;
+            /** Turbine */
+            turbine: string;
         };
         /**
          * RestartDone
@@ -882,6 +1226,114 @@ export interface components {
             user: string | null;
             /** Version */
             version: string;
+        };
+        /**
+         * SetDoc
+         * @description One set: raw values by address, and the objects that were not read, each with the reason.
+         */
+        SetDoc: {
+            /** Empty */
+            empty: string[];
+            head: components["schemas"]["SetHead"];
+            /** Name */
+            name: string;
+            /** Path */
+            path: string;
+            /** Unread */
+            unread: {
+                [key: string]: string;
+            };
+            /** Values */
+            values: {
+                [key: string]: number | string;
+            };
+        };
+        /**
+         * SetHead
+         * @description What a set says of itself: who it is of, and how many objects were read, not read, and empty.
+         */
+        SetHead: {
+            /** Description Id */
+            description_id: string;
+            /** Description Version */
+            description_version: string;
+            /** Empty */
+            empty: number;
+            /** Hash */
+            hash: string;
+            identity: components["schemas"]["SetIdentity"];
+            origin: components["schemas"]["SetOrigin"];
+            /** Unread */
+            unread: number;
+            /** Values */
+            values: number;
+        };
+        /**
+         * SetIdentity
+         * @description What the device said of itself; null where it did not answer.
+         */
+        SetIdentity: {
+            /** Device Name */
+            device_name: string | null;
+            /** Device Type */
+            device_type: number | null;
+            /** Hardware */
+            hardware: string | null;
+            /** Product Code */
+            product_code: number | null;
+            /** Revision */
+            revision: number | null;
+            /** Serial */
+            serial: number | null;
+            /** Software */
+            software: string | null;
+            /** Vendor Id */
+            vendor_id: number | null;
+        };
+        /**
+         * SetList
+         * @description The set files of the data folder.
+         */
+        SetList: {
+            /** Files */
+            files: components["schemas"]["SetRef"][];
+            /** Folder */
+            folder: string;
+        };
+        /**
+         * SetOrigin
+         * @description Where, when and by whom a set was made; ``time`` is ISO 8601, UTC.
+         */
+        SetOrigin: {
+            /** Device */
+            device: string;
+            /** Node */
+            node: number;
+            /** Person */
+            person: string;
+            /** Reason */
+            reason: string;
+            /** Time */
+            time: string;
+            /** Tool */
+            tool: string;
+            /** Turbine */
+            turbine: string;
+        };
+        /**
+         * SetRef
+         * @description One file. ``head`` null: not read yet, or not usable, then ``reason`` says why.
+         */
+        SetRef: {
+            head: components["schemas"]["SetHead"] | null;
+            /** Modified Ns */
+            modified_ns: number;
+            /** Name */
+            name: string;
+            /** Reason */
+            reason: string | null;
+            /** Size Bytes */
+            size_bytes: number;
         };
         /**
          * StationRef
@@ -1027,6 +1479,36 @@ export interface components {
             /** Raw */
             raw: number | string;
         };
+        /**
+         * WritesRequest
+         * @description ``save`` makes each device's values permanent that has verified writes; with "stop" nothing follows a failure.
+         */
+        WritesRequest: {
+            /**
+             * On Failure
+             * @default stop
+             * @enum {string}
+             */
+            on_failure: "stop" | "go-on";
+            /** Rows */
+            rows: components["schemas"]["WritesRow"][];
+            /** Save */
+            save: boolean;
+        };
+        /**
+         * WritesRow
+         * @description One object. ``expected_raw`` is what RAM held when the change was made; null leaves that unchecked.
+         */
+        WritesRow: {
+            /** Address */
+            address: string;
+            /** Device */
+            device: string;
+            /** Expected Raw */
+            expected_raw?: number | string | null;
+            /** Raw */
+            raw: number | string;
+        };
     };
     responses: never;
     parameters: never;
@@ -1036,6 +1518,40 @@ export interface components {
 }
 export type $defs = Record<string, never>;
 export interface operations {
+    backup: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["BackupRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["JobDoc"];
+                };
+            };
+            /** @description What went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                    "application/problem+json": unknown;
+                };
+            };
+        };
+    };
     connect: {
         parameters: {
             query?: never;
@@ -1452,6 +1968,164 @@ export interface operations {
             };
         };
     };
+    writes: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["WritesRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["JobDoc"];
+                };
+            };
+            /** @description What went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                    "application/problem+json": unknown;
+                };
+            };
+        };
+    };
+    recordings: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["RecordingList"];
+                };
+            };
+            /** @description What went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                    "application/problem+json": unknown;
+                };
+            };
+        };
+    };
+    recording: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                name: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["RecordingDoc"];
+                };
+            };
+            /** @description What went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                    "application/problem+json": unknown;
+                };
+            };
+        };
+    };
+    download_attachment: {
+        parameters: {
+            query: {
+                attachment: string;
+            };
+            header?: never;
+            path: {
+                name: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description What went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                    "application/problem+json": unknown;
+                };
+            };
+        };
+    };
+    download_recording: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                name: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description What went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                    "application/problem+json": unknown;
+                };
+            };
+        };
+    };
     session: {
         parameters: {
             query?: never;
@@ -1469,6 +2143,100 @@ export interface operations {
                 content: {
                     "application/json": components["schemas"]["Session"];
                 };
+            };
+            /** @description What went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                    "application/problem+json": unknown;
+                };
+            };
+        };
+    };
+    sets: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SetList"];
+                };
+            };
+            /** @description What went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                    "application/problem+json": unknown;
+                };
+            };
+        };
+    };
+    parameter_set: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                turbine: string;
+                file: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SetDoc"];
+                };
+            };
+            /** @description What went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                    "application/problem+json": unknown;
+                };
+            };
+        };
+    };
+    download_set: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                turbine: string;
+                file: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
             /** @description What went wrong */
             default: {

@@ -30,6 +30,13 @@ export type ValuesData = Schemas["ValuesData"];
 export type ValueData = Schemas["ValueCell"];
 export type EventData = Schemas["EventLine"];
 
+export type RecordingList = Schemas["RecordingList"];
+export type RecordingRef = Schemas["RecordingRef"];
+export type RecordingDoc = Schemas["RecordingDoc"];
+export type SetList = Schemas["SetList"];
+export type SetRef = Schemas["SetRef"];
+export type SetDoc = Schemas["SetDoc"];
+
 /** What fills the placeholders of a text. */
 export type Details = Record<string, unknown>;
 

@@ -23,9 +23,35 @@ export interface PageSearch {
   hide?: string;
   /** Address of the parameter that is open. */
   edit?: string;
+  /** Number of the blade that the axis room shows. */
+  blade?: string;
+  /** Seconds that its plots span. */
+  span?: string;
+  /** Name of the recording or set that is open. */
+  file?: string;
+  /** The procedure that is open. */
+  procedure?: string;
+  /** Filter and least severity of the event drawer, and its height in pixels. */
+  eventq?: string;
+  severity?: string;
+  drawer?: string;
 }
 
-const TEXTS = ["device", "q", "closed", "sort", "hide", "edit"] as const;
+const TEXTS = [
+  "device",
+  "q",
+  "closed",
+  "sort",
+  "hide",
+  "edit",
+  "blade",
+  "span",
+  "file",
+  "procedure",
+  "eventq",
+  "severity",
+  "drawer",
+] as const;
 
 /** Takes what is valid and leaves the rest: a damaged link opens the page all the same. */
 export function readSearch(raw: Record<string, unknown>): PageSearch {
