@@ -5,13 +5,14 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections import OrderedDict
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Final
 from uuid import uuid4
 
 from app.errors import HubsideError
+from app.model.datatypes import Raw
 
 log = logging.getLogger(__name__)
 
@@ -27,9 +28,41 @@ class JobState(Enum):
     CANCELLED = "cancelled"
 
 
+class RowState(Enum):
+    """How one object of a job that writes stands.
+
+    ``UNPROVEN``: sent and acknowledged, but only an effect would prove it. ``REFUSED``: by us or by the device, or not
+    verified; the row's error says which. ``NOT_SAVED``: verified in RAM, but the save was not acknowledged.
+    """
+
+    WAITING = "waiting"
+    SENT = "sent"
+    VERIFIED = "verified"
+    UNPROVEN = "unproven"
+    SAVING = "saving"
+    SAVED = "saved"
+    REFUSED = "refused"
+    NOT_SAVED = "not_saved"
+
+
+@dataclass
+class JobRow:
+    """One object of a job that writes: ``was`` and ``read`` are what RAM held before and after; ``error`` says why."""
+
+    device: str
+    address: str
+    state: RowState = RowState.WAITING
+    was: Raw | None = None
+    read: Raw | None = None
+    error: HubsideError | None = None
+
+
 @dataclass
 class Job:
-    """One piece of work; ``failed`` names what did not succeed although the job went on."""
+    """One piece of work; ``failed`` names what did not succeed although the job went on.
+
+    ``result`` is what it has found so far, of a type that its kind knows.
+    """
 
     id: str
     kind: str
@@ -39,6 +72,8 @@ class Job:
     total: int = 0
     failed: list[tuple[str, HubsideError]] = field(default_factory=list)
     error: HubsideError | None = None
+    rows: list[JobRow] = field(default_factory=list)
+    result: object = None
 
 
 class Jobs:
@@ -48,9 +83,9 @@ class Jobs:
         self._jobs: OrderedDict[str, Job] = OrderedDict()
         self._tasks: dict[str, asyncio.Task[None]] = {}
 
-    def start(self, kind: str, device: str, work: Callable[[Job], Awaitable[None]]) -> Job:
-        """Run ``work`` in the background; it reports through the job that it is given."""
-        job = Job(uuid4().hex, kind, device)
+    def start(self, kind: str, device: str, work: Callable[[Job], Awaitable[None]], rows: Sequence[JobRow] = ()) -> Job:
+        """Run ``work`` in the background; it reports through the job that it is given, and through its rows."""
+        job = Job(uuid4().hex, kind, device, total=len(rows), rows=list(rows))
         self._jobs[job.id] = job
         while len(self._jobs) > KEPT:
             oldest = next(iter(self._jobs))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from app.drivers.contract import Driver, Written
-from app.errors import DeviceError, HubsideError, NoAnswerError, UnverifiedError
+from app.errors import ConflictError, DeviceError, HubsideError, NoAnswerError, UnverifiedError
 from app.model.address import Address
 from app.model.checks import Allow, check_write
 from app.model.datatypes import Raw
@@ -55,9 +55,11 @@ async def write_raw(
     journal: Journal,
     *,
     allow: Allow = Allow.NOTHING,
+    expected: Raw | None = None,
 ) -> WriteResult:
     """Check, write once, read back.
 
+    ``expected`` is what the change was made from; where RAM holds another value, nothing is written (ConflictError).
     Raises RefusedError (nothing was sent), DeviceError (the device refused), NoAnswerError, or UnverifiedError (sent,
     but another value was read back, or none).
     """
@@ -65,6 +67,13 @@ async def write_raw(
     await _know_what_it_rests_on(driver, target, entry)
     data = check_write(target.description, entry, raw, target.lookup, allow=allow)
     was = decode(entry, await driver.read(target.node, address, entry.timeout_s)) if entry.access.readable else None
+    if expected is not None and was is not None and was != expected:
+        raise ConflictError(
+            address=address.short,
+            name=entry.title,
+            expected=_shown(target, entry, expected),
+            found=_shown(target, entry, was),
+        )
     shown = {"address": address.short, "name": entry.title, "was": _shown(target, entry, was)}
     try:
         how = await driver.write(target.node, address, data, entry.timeout_s, entry.verify)

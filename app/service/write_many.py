@@ -1,0 +1,162 @@
+"""Write a reviewed batch of changes: checked as a whole, written one by one, read back, then saved device by device."""
+
+from __future__ import annotations
+
+import asyncio
+from collections import Counter
+from collections.abc import Callable, Coroutine, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any
+
+from app.drivers.contract import Driver
+from app.errors import BusLostError, HubsideError, UsageError
+from app.model.address import Address
+from app.model.checks import Allow, check_write
+from app.model.datatypes import Raw
+from app.service.devices import Target
+from app.service.jobs import Job, JobRow, RowState
+from app.service.journal import Journal
+from app.service.save import save
+from app.service.write import write_raw
+
+
+class OnFailure(Enum):
+    """What happens to the rows after one that failed.
+
+    ``STOP``: nothing more is written, and nothing is saved, so that half a batch never becomes permanent by itself.
+    """
+
+    STOP = "stop"
+    GO_ON = "go-on"
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """One object to write. ``expected`` is what RAM held when the change was made; None where that was not known."""
+
+    driver: Driver
+    target: Target
+    address: Address
+    raw: Raw
+    expected: Raw | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Order:
+    """A batch as a person confirmed it. ``save``: make each device's values permanent that has verified writes."""
+
+    changes: Sequence[Change]
+    save: bool
+    on_failure: OnFailure
+    allow: Allow = Allow.NOTHING
+
+
+def prepare(order: Order) -> list[JobRow]:
+    """The rows of a job, all waiting. Raises UsageError where an object is to be written twice, or nothing at all."""
+    if not order.changes:
+        raise UsageError(reason="no change to write")
+    places = [(change.target.slug, change.address) for change in order.changes]
+    for (slug, address), times in Counter(places).items():
+        if times > 1:
+            raise UsageError(reason=f"{slug} {address.short} is there {times} times")
+    return [JobRow(slug, address.short) for slug, address in places]
+
+
+async def write_many(job: Job, order: Order, journal: Journal, now_ns: Callable[[], int]) -> None:
+    """Write the rows of ``prepare`` device by device, each in the order given; the job's rows tell how far it is.
+
+    Every row is checked before the first is sent; a refused row is never sent, and with STOP none is then. A cancelled
+    job ends between two writes, never within one. A lost bus ends it as well. What failed stands in the rows.
+    """
+    rows = list(zip(order.changes, job.rows, strict=True))
+    _check_all(rows, order.allow)
+    job.done = sum(row.state is RowState.REFUSED for row in job.rows)
+    if job.done and order.on_failure is OnFailure.STOP:
+        return
+    devices = list(dict.fromkeys(change.target.slug for change in order.changes))
+    for slug in devices:
+        own = [(change, row) for change, row in rows if change.target.slug == slug]
+        for change, row in own:
+            if row.state is not RowState.WAITING:
+                continue
+            await _whole(_write(change, row, order.allow, journal))
+            job.done += 1
+            if _ends(row, order.on_failure):
+                return
+    if order.save:
+        for slug in devices:
+            own = [(change, row) for change, row in rows if change.target.slug == slug]
+            await _whole(_save(own, journal, now_ns))
+
+
+def _check_all(rows: Sequence[tuple[Change, JobRow]], allow: Allow) -> None:
+    """Refuse what cannot be written, with the values that the rows before it will have set."""
+    planned: dict[tuple[str, Address], Raw] = {}
+    for change, row in rows:
+        target = change.target
+
+        def lookup(address: Address, target: Target = target) -> Raw | None:
+            found = planned.get((target.slug, address))
+            return target.lookup(address) if found is None else found
+
+        try:
+            check_write(target.description, target.entry(change.address), change.raw, lookup, allow=allow)
+        except HubsideError as error:
+            row.state, row.error = RowState.REFUSED, error
+        else:
+            planned[target.slug, change.address] = change.raw
+
+
+def _ends(row: JobRow, on_failure: OnFailure) -> bool:
+    """True where nothing more is to be written: each further row would wait in vain on a bus that is gone."""
+    if row.error is None:
+        return False
+    return on_failure is OnFailure.STOP or isinstance(row.error, BusLostError)
+
+
+async def _write(change: Change, row: JobRow, allow: Allow, journal: Journal) -> None:
+    row.state = RowState.SENT
+    try:
+        done = await write_raw(
+            change.driver,
+            change.target,
+            change.address,
+            change.raw,
+            journal,
+            allow=allow,
+            expected=change.expected,
+        )
+    except HubsideError as error:
+        row.state, row.error = RowState.REFUSED, error
+        return
+    row.was, row.read = done.was, done.read
+    row.state = RowState.VERIFIED if done.verified else RowState.UNPROVEN
+
+
+async def _save(rows: Sequence[tuple[Change, JobRow]], journal: Journal, now_ns: Callable[[], int]) -> None:
+    """Save one device where a value that it keeps was verified."""
+    kept = [row for change, row in rows if row.state is RowState.VERIFIED and change.target.entry(change.address).saved]
+    if not kept:
+        return
+    driver, target = rows[0][0].driver, rows[0][0].target
+    for row in kept:
+        row.state = RowState.SAVING
+    try:
+        await save(driver, target, journal, now_ns)
+    except HubsideError as error:
+        for row in kept:
+            row.state, row.error = RowState.NOT_SAVED, error
+        return
+    for row in kept:
+        row.state = RowState.SAVED
+
+
+async def _whole(work: Coroutine[Any, Any, None]) -> None:
+    """Run to its end, which every time-out of a driver brings about, even where the job is cancelled meanwhile."""
+    task = asyncio.ensure_future(work)
+    try:
+        await asyncio.shield(task)
+    except asyncio.CancelledError:
+        await asyncio.wait([task])
+        raise
