@@ -9,6 +9,7 @@ import signal
 import sys
 from collections.abc import AsyncIterator, Coroutine
 from contextlib import asynccontextmanager
+from pathlib import Path
 from typing import Any
 
 from app.cli.output import Output, tell_warning
@@ -23,6 +24,7 @@ from app.service.bitrates import with_bitrate, with_bitrates
 from app.service.connection import Connection
 from app.service.options import Options
 from app.service.sites import Sites
+from app.store.store import Store
 
 TERMINATED = 143
 """Exit code after SIGTERM, as shells have it."""
@@ -60,15 +62,36 @@ async def connected(
         yield connection
 
 
-async def make_bench(arguments: argparse.Namespace, output: Output, record: bool) -> tuple[str, Bench]:
-    """A bench that knows all turbines of the arguments, and the slug of the one to connect to."""
+async def make_bench(arguments: argparse.Namespace, output: Output, record: bool) -> tuple[str | None, Bench]:
+    """A bench that knows all turbines of the arguments, and the slug of the one to connect to.
+
+    Without ``--site`` and ``--can`` it knows those of the data folder's site file, and connects to one where only one
+    is named; what is connected, and to what, is chosen in the page then.
+    """
+    store = Store.open(arguments.settings.data)  # first: nothing is sent where another process is at work already
     sheets = sheets_of(arguments, output)
-    turbine = await _turbine_with_devices(arguments, output, sheets)
-    known = (turbine,) if arguments.site is None else load_site(arguments.site)
-    home = arguments.settings.data / "site.toml"
+    home: Path = arguments.settings.data / "site.toml"
+    if arguments.can is not None:
+        first: Turbine | None = await _turbine_with_devices(arguments, output, sheets)
+        known: tuple[Turbine, ...] = (first,)
+    else:
+        known, first = _from_site_file(arguments, home)
     sites = Sites(known, lambda one: descriptions_for(sheets, one, arguments.site), arguments.site, home)
     spare_collector()
-    return turbine.slug, Bench(sites, options_of(arguments, record), output.error)
+    bench = Bench(sites, options_of(arguments, record), output.error, store=store)
+    return None if first is None else first.slug, bench
+
+
+def _from_site_file(arguments: argparse.Namespace, home: Path) -> tuple[tuple[Turbine, ...], Turbine | None]:
+    """The turbines that are known, and the one to connect to, where it is clear which."""
+    named = arguments.site is not None
+    if not named and home.exists():
+        arguments.site = home
+    if arguments.site is None:
+        return (), None
+    known = load_site(arguments.site)
+    clear = named or len(known) == 1 or arguments.turbine is not None
+    return known, site_turbine(arguments) if clear else None
 
 
 async def _turbine_with_devices(arguments: argparse.Namespace, output: Output, sheets: Sheets) -> Turbine:

@@ -19,7 +19,7 @@ from app.cli.arguments import milliseconds, port
 from app.cli.connecting import SWITCH_INTERVAL_S, make_bench
 from app.cli.output import Output
 from app.cli.targets import add_connection
-from app.errors import BusOpenError
+from app.errors import BusOpenError, NoAnswerError
 from app.model.description_file import bundled_folder
 from app.recording.recover import recover_all
 from app.service.bench import Bench
@@ -30,8 +30,8 @@ START_S = 20.0
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Register both commands."""
-    serve = commands.add_parser("serve", help="serve the page of a turbine")
-    add_connection(serve)
+    serve = commands.add_parser("serve", help="serve the page; the turbine may be chosen there")
+    add_connection(serve, required=False)
     serve.add_argument("--no-record", action="store_true", help="do not record")
     serve.set_defaults(run=lambda arguments, output: _start(_serve(arguments, output)))
     demo = commands.add_parser("demo", help="twins of three blades, and the page on them")
@@ -108,7 +108,8 @@ async def _serve(arguments: argparse.Namespace, output: Output) -> int:
             loop.add_signal_handler(number, stop.set)
     turbine, bench = await make_bench(arguments, output, not arguments.no_record)
     try:
-        await bench.connect(turbine, settings.person)
+        if turbine is not None:
+            await _connect(bench, turbine, settings.person, output)
         async with _page(arguments, output, bench):
             output.say("cli.demo_data", folder=settings.data)
             output.say("cli.stop_hint")
@@ -116,6 +117,14 @@ async def _serve(arguments: argparse.Namespace, output: Output) -> int:
     finally:
         await bench.close()
     return 0
+
+
+async def _connect(bench: Bench, turbine: str, person: str, output: Output) -> None:
+    """Connect at the start. Where the adapter is not there yet, the page is served all the same and can try again."""
+    try:
+        await bench.connect(turbine, person)
+    except NoAnswerError as error:
+        output.error(error)
 
 
 @contextlib.asynccontextmanager
@@ -127,7 +136,7 @@ async def _page(arguments: argparse.Namespace, output: Output, bench: Bench) -> 
 
     listener = open_port(arguments.port)
     at = port_of(listener)
-    access = Access(time.monotonic)
+    access = Access(bench.office.sessions, at)
     scene = await asyncio.to_thread(HubScene, secrets.token_urlsafe(32))
     try:
         application = create_app(bench, access, at, scene, arguments.settings.language)

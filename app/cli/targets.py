@@ -19,9 +19,9 @@ BUS = "can0"
 SHEET_SUFFIXES = (".eds", ".dcf")
 
 
-def add_connection(parser: argparse.ArgumentParser) -> None:
+def add_connection(parser: argparse.ArgumentParser, required: bool = True) -> None:
     """``--site`` or ``--can``, and how the connection is made."""
-    where = parser.add_mutually_exclusive_group(required=True)
+    where = parser.add_mutually_exclusive_group(required=required)
     where.add_argument("--site", type=Path, help="site file that names turbines, stations and devices")
     where.add_argument(
         "--can", metavar="INTERFACE:CHANNEL[@BITRATE]", help="socketcan:can0@500000, slcan:COM3@search …"

@@ -166,6 +166,11 @@ class CanOpenDriver:
         """What went other than planned: time-outs, retries, late and ignored answers."""
         return self._client.counters
 
+    @property
+    def needs_consent(self) -> bool:
+        """True where another master was there before us and nobody has consented: nothing is sent."""
+        return bool(self._masters_before) and not self._consent
+
     def grant_consent(self) -> None:
         """Allow active access although another master is on the bus."""
         self._consent = True
@@ -341,7 +346,7 @@ class CanOpenDriver:
             raise BusLostError(bus=self.bus, reason=status.reason or status.state.value)
         if self._config.listen_only or self._listening:
             raise RefusedError(device=self.bus, address="", reason="the connection is listening only")
-        if asked and self._masters_before and not self._consent:
+        if asked and self.needs_consent:
             raise ConsentError(bus=self.bus, seen=", ".join(sign.value for sign in self._masters_before))
 
 

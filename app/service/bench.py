@@ -15,9 +15,13 @@ from app.service.bitrates import with_bitrates
 from app.service.connection import Connection
 from app.service.journal import Journal, Kind
 from app.service.link import TwinWatch
+from app.service.office import Office
 from app.service.options import Options
 from app.service.poll import Poller
+from app.service.polling import Polling
+from app.service.site_edit import SiteEditor
 from app.service.sites import Sites
+from app.store.store import Store
 from app.wire.frame import Stamper
 
 log = logging.getLogger(__name__)
@@ -35,7 +39,8 @@ class Bench:
     """Connections follow one another; time, journal and the people at work go on. Lives in the event loop.
 
     ``told`` hears of devices that could not be read after a connection was made. ``epoch`` is raised with every
-    connection that is made or ended, so that whoever shows the live state knows that it is another one.
+    connection that is made or ended, so that whoever shows the live state knows that it is another one. What people do
+    is kept in ``store``, which the bench closes at its end; without one it is forgotten then.
     """
 
     def __init__(
@@ -45,11 +50,17 @@ class Bench:
         told: Told = _log,
         wall_ns: Callable[[], int] = time.time_ns,
         monotonic_ns: Callable[[], int] = time.monotonic_ns,
+        store: Store | None = None,
+        stamper: Stamper | None = None,
+        journal: Journal | None = None,
     ) -> None:
         self.sites = sites
         self.options = options
-        self.stamper = Stamper(wall_ns(), monotonic_ns)
-        self.journal = Journal(self.stamper, options.person)
+        self.stamper = stamper or Stamper(wall_ns(), monotonic_ns)
+        self.journal = journal or Journal(self.stamper, options.person)
+        self.office = Office(store or Store.in_memory(), self.journal, self.stamper, options.person)
+        self.site_editor = SiteEditor(sites)
+        self.polling = Polling()
         self.connection: Connection | None = None
         self.twins: TwinWatch | None = None
         self.epoch = 0
@@ -88,27 +99,47 @@ class Bench:
         self.connection = connection
         self.epoch += 1
 
+    async def consent(self, person: str) -> None:
+        """Go active although another master is on the bus, and read what could not be read until now.
+
+        Raises NotConnectedError.
+        """
+        async with self._changing:
+            connection = self.require()
+            held_back = [name for name, link in connection.buses.items() if link.needs_consent]
+            if not held_back:
+                return
+            for name in held_back:
+                self.journal.by(person).note(Kind.CONSENT, None, bus=name)
+                connection.buses[name].driver.grant_consent()
+            await self._end_look()
+            self._look = asyncio.create_task(self._first_look(connection, person))
+
     async def disconnect(self, person: str) -> None:
         """End the connection; the recording is finished. Nothing happens where there is none."""
         async with self._changing:
             await self._end(person)
 
     async def close(self) -> None:
-        """End the connection at the end of the server."""
+        """End the connection at the end of the server, then the office."""
         await self.disconnect(self.options.person)
+        await self.office.close()
 
     async def _end(self, person: str) -> None:
         connection = self.connection
         if connection is None:
             return
-        if self._look is not None:
-            self._look.cancel()
-            await asyncio.gather(self._look, return_exceptions=True)
-            self._look = None
+        await self._end_look()
         self.connection, self.twins = None, None
         self.epoch += 1
         self.journal.by(person).note(Kind.DISCONNECTED, None, turbine=connection.turbine.name)
         await connection.close()
+
+    async def _end_look(self) -> None:
+        if self._look is not None:
+            self._look.cancel()
+            await asyncio.gather(self._look, return_exceptions=True)
+            self._look = None
 
     async def _first_look(self, connection: Connection, person: str) -> None:
         """Read everything once, then keep polling what the screens need."""
@@ -121,7 +152,7 @@ class Bench:
         else:
             for error in unreachable(reports).values():
                 self._told(error)
-        poller = Poller(connection)
+        poller = Poller(connection, lambda: self.polling.plan)
         try:
             await asyncio.Event().wait()
         finally:

@@ -110,6 +110,11 @@ class BusLink:
         status: DriverStatus = self.driver.status
         return status
 
+    @property
+    def needs_consent(self) -> bool:
+        """Another master is at work, and nobody has consented to active access yet."""
+        return bool(self.driver.needs_consent)
+
     def pdos(self, node: int) -> tuple[PdoRoute, ...]:
         """The PDOs of ``node`` by the mapping in force."""
         with self._lock:

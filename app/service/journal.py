@@ -22,6 +22,7 @@ class Kind(Enum):
     BUS_LOST = "bus_lost"
     BUS_BACK = "bus_back"
     OTHER_MASTER = "other_master"
+    CONSENT = "consent"
     RECORDING_STARTED = "recording_started"
     RECORDING_STOPPED = "recording_stopped"
     RECORDING_LOST = "recording_lost"
@@ -31,16 +32,27 @@ class Kind(Enum):
     RESTART = "restart"
     STOP_SENT = "stop_sent"
     FEATHER_SENT = "feather_sent"
+    FOREIGN_WRITTEN = "foreign_written"
+    STORE_FAILED = "store_failed"
+    STORE_BACK = "store_back"
     SETTINGS_CHANGED = "settings_changed"
 
     @property
     def severity(self) -> Severity:
         """Errors are what was lost or failed; a warning changes what the tool may do."""
-        if self in (Kind.BUS_LOST, Kind.WRITE_FAILED, Kind.RECORDING_LOST):
+        if self in (Kind.BUS_LOST, Kind.WRITE_FAILED, Kind.RECORDING_LOST, Kind.STORE_FAILED):
             return Severity.ERROR
-        if self in (Kind.OTHER_MASTER, Kind.RECORDING_STOPPED, Kind.STOP_SENT, Kind.FEATHER_SENT):
-            return Severity.WARNING
-        return Severity.INFO
+        return Severity.WARNING if self in _WARNINGS else Severity.INFO
+
+
+_WARNINGS: Final = (
+    Kind.OTHER_MASTER,
+    Kind.CONSENT,
+    Kind.RECORDING_STOPPED,
+    Kind.STOP_SENT,
+    Kind.FEATHER_SENT,
+    Kind.FOREIGN_WRITTEN,
+)
 
 
 @dataclass(frozen=True, slots=True)

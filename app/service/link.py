@@ -44,6 +44,10 @@ class Bus(Protocol):
     def status(self) -> DriverStatus:
         """State of the link."""
 
+    @property
+    def needs_consent(self) -> bool:
+        """Nothing is sent before somebody consents, because another master is there."""
+
     def bus_load(self, now_ns: int) -> float:
         """Load of the last second, 0..1."""
 
@@ -86,6 +90,7 @@ class LinkLine:
     dropped: int
     recording: RecordingLine
     other_masters: tuple[MasterLine, ...]
+    needs_consent: bool
 
 
 class TwinWatch:
@@ -119,7 +124,7 @@ def link_line(buses: Mapping[str, Bus], recording: RecorderStatus | None, twins:
     """The state of the link at ``now_ns``. ``twins``: every device says that it is simulated."""
     known = {name: (bus, bus.status) for name, bus in buses.items()}
     if not known:
-        return LinkLine("disconnected", None, "none", "", 0, 0.0, 0, 0, recording_line(recording), ())
+        return LinkLine("disconnected", None, "none", "", 0, 0.0, 0, 0, recording_line(recording), (), False)
     name, (bus, status) = min(known.items(), key=lambda item: _WORST_FIRST.index(item[1][1].state))
     masters = tuple(
         MasterLine(each, sign.value, can_id, t_ns, count)
@@ -137,6 +142,7 @@ def link_line(buses: Mapping[str, Bus], recording: RecorderStatus | None, twins:
         dropped=sum(at.dropped for _, at in known.values()),
         recording=recording_line(recording),
         other_masters=masters,
+        needs_consent=any(each.needs_consent for each, _ in known.values()),
     )
 
 
@@ -189,7 +195,7 @@ def link_urgent(line: LinkLine) -> tuple[object, ...]:
     """The part of the line whose change must be told at once; counters and load are not in it."""
     recording = (line.recording.state, line.recording.reason, line.recording.lost, line.recording.file)
     signs = tuple((master.bus, master.sign, master.can_id) for master in line.other_masters)
-    return (line.state, line.reason, line.mode, line.dropped, recording, signs)
+    return (line.state, line.reason, line.mode, line.dropped, recording, signs, line.needs_consent)
 
 
 def recording_line(status: RecorderStatus | None) -> RecordingLine:

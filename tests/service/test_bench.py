@@ -6,6 +6,7 @@ import asyncio
 from collections.abc import AsyncIterator
 from pathlib import Path
 
+import can
 import pytest
 
 from app.errors import BusOpenError, NotConnectedError, UsageError
@@ -15,6 +16,7 @@ from app.model.site import Turbine, load_site
 from app.recording.reader import open_recording
 from app.service.bench import Bench
 from app.service.journal import Kind
+from app.service.link import bench_line
 from app.service.options import Options
 from app.service.sites import Sites
 from tests.e2e.conftest import site_for
@@ -96,3 +98,31 @@ async def test_an_unknown_turbine_leaves_the_connection_alone(bench: Bench) -> N
     with pytest.raises(UsageError, match="wtg-99"):
         await bench.connect("wtg-99", "anna")
     assert bench.connection is connection
+
+
+async def test_beside_another_master_only_listening_until_somebody_consents(served: Served, bench: Bench) -> None:
+    stop = asyncio.Event()
+
+    async def foreign_master() -> None:
+        with can.Bus(interface="socketcand", host="127.0.0.1", port=served.server.port, channel="can0") as bus:
+            while not stop.is_set():
+                bus.send(can.Message(arbitration_id=0x80, is_extended_id=False))
+                await asyncio.sleep(0.01)
+
+    master = asyncio.create_task(foreign_master())
+    try:
+        connection = await bench.connect("wtg-07", "anna")
+        link = connection.buses["can0"]
+        assert link.needs_consent
+        assert bench_line(bench).needs_consent
+        assert connection.target("wtg-07/blade-1/pmc").lookup(POSITION) is None
+        await bench.consent("bert")
+        assert not link.needs_consent
+        await heard_of(bench)
+        consents = [one for one in bench.journal.latest() if one.kind is Kind.CONSENT]
+        assert [one.person for one in consents] == ["bert"]
+        await bench.consent("bert")
+        assert len([one for one in bench.journal.latest() if one.kind is Kind.CONSENT]) == 1, "told once"
+    finally:
+        stop.set()
+        await master

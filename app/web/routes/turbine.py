@@ -46,6 +46,13 @@ async def disconnect(bench: BenchOf, person: PersonOf, _request: Nothing) -> Not
     return Nothing()
 
 
+@router.post("/live/consent", dependencies=[needs(Role.TECHNICIAN)])
+async def consent(bench: BenchOf, person: PersonOf, _request: Nothing) -> Nothing:
+    """Consent to active access beside another master, as agreed with its operator."""
+    await bench.consent(person.person)
+    return Nothing()
+
+
 @router.get("/live/turbine")
 async def turbine(bench: BenchOf) -> Turbine | None:
     """The connected turbine with its stations and devices; null where none is connected."""

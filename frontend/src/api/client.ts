@@ -1,4 +1,13 @@
-import type { Job, ProblemDoc, Raw, RestartResult, SaveResult, StopResult, WriteResult } from "./types";
+import type {
+  Job,
+  ProblemDoc,
+  Raw,
+  RestartResult,
+  SaveResult,
+  StopResult,
+  WriteResult,
+  WritesRequest,
+} from "./types";
 
 /** A request that the server or the device refused, with all that it said. */
 export class Problem extends Error {
@@ -61,8 +70,10 @@ export const commands = {
   read: (slug: string, addresses: string[] | null) => post<Job>(`${device(slug)}/read`, { addresses }),
   write: (slug: string, address: string, raw: Raw) =>
     post<WriteResult>(`${device(slug)}/write`, { address, raw }),
+  writes: (order: WritesRequest) => post<Job>("/api/live/writes", order),
   save: (slug: string) => post<SaveResult>(`${device(slug)}/save`, {}),
   restart: (slug: string) => post<RestartResult>(`${device(slug)}/restart`, {}),
+  consent: () => post<object>("/api/live/consent", {}),
   stop: () => post<StopResult>("/api/live/stop", {}),
   feather: () => post<StopResult>("/api/live/feather", {}),
   cancel: (id: string) => request<Job>(`/api/live/jobs/${id}`, { method: "DELETE" }),

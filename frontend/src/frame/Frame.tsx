@@ -2,6 +2,7 @@ import { Outlet, useRouterState } from "@tanstack/react-router";
 import { Suspense } from "react";
 import { useHearing, useLink } from "../live/live";
 import { Notices } from "../ui/Notices";
+import { ConsentBanner } from "./ConsentBanner";
 import { DeafBanner } from "./DeafBanner";
 import { EventDrawer } from "./EventDrawer";
 import classes from "./Frame.module.css";
@@ -21,6 +22,7 @@ export function Frame() {
     <div className={classes.frame} data-deaf={deaf} data-mode={mode} data-page={path}>
       <TopBar />
       <DeafBanner />
+      <ConsentBanner />
       <Navigation />
       <main className={classes.main}>
         <Suspense>

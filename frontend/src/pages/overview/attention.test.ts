@@ -41,6 +41,7 @@ const link: LinkData = {
   dropped: 0,
   recording,
   other_masters: [],
+  needs_consent: false,
 };
 const node = (ageMs: number | null): NodeData => ({
   device: PMC,
