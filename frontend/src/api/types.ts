@@ -15,6 +15,9 @@ export type DeviceRef = Schemas["DeviceRef"];
 
 export type ProblemDoc = Schemas["Problem"];
 export type Job = Schemas["JobDoc"];
+export type JobRow = Schemas["JobRowDoc"];
+export type Failure = Schemas["Failure"];
+export type WritesRequest = Schemas["WritesRequest"];
 export type WriteResult = Schemas["WriteDone"];
 export type SaveResult = Schemas["SaveDone"];
 export type RestartResult = Schemas["RestartDone"];

@@ -13,8 +13,12 @@ export interface PageSearch {
   events?: "open";
   device?: string;
   q?: string;
-  /** "changed" shows only what differs from the default. */
-  only?: "changed";
+  /** Which parameters are shown: "changed", "different", "starred", "pending", separated by commas. */
+  only?: string;
+  /** All devices of the kind side by side. */
+  view?: "side";
+  /** The review of what is pending is open. */
+  review?: "open";
   /** Groups that are closed, separated by commas. */
   closed?: string;
   /** Column, with a minus sign before it where descending. */
@@ -40,6 +44,7 @@ export interface PageSearch {
 const TEXTS = [
   "device",
   "q",
+  "only",
   "closed",
   "sort",
   "hide",
@@ -60,7 +65,8 @@ export function readSearch(raw: Record<string, unknown>): PageSearch {
   if (raw.theme === "dark" || raw.theme === "light") search.theme = raw.theme;
   if (raw.scene === "off") search.scene = raw.scene;
   if (raw.events === "open") search.events = raw.events;
-  if (raw.only === "changed") search.only = raw.only;
+  if (raw.view === "side") search.view = raw.view;
+  if (raw.review === "open") search.review = raw.review;
   for (const name of TEXTS) {
     const text = raw[name];
     if (typeof text === "string" && text !== "") search[name] = text;

@@ -162,14 +162,31 @@ export function parse(doc: DescriptionDoc, entry: EntryDoc, typed: string, looku
 
 /** Checks a raw number against limits and an exclusive enumeration. */
 function checkNumber(doc: DescriptionDoc, entry: EntryDoc, raw: Raw, lookup: Lookup): Parsed {
+  const why = misfitOf(doc, entry, raw, lookup);
+  return why === null ? { ok: true, raw } : misfit(why);
+}
+
+/** Why a raw value is refused while other objects have the values that `lookup` knows; null where it fits. */
+export function misfitOf(doc: DescriptionDoc, entry: EntryDoc, raw: Raw, lookup: Lookup): Misfit | null {
+  if (!isInteger(entry) && !isFloat(entry)) return null;
   const { low, high } = entry.also.includes(Number(raw))
     ? { low: null, high: null }
     : limitsOf(entry, lookup);
-  if (low !== null && Number(raw) < low) return misfit(Misfit.BelowLimit);
-  if (high !== null && Number(raw) > high) return misfit(Misfit.AboveLimit);
+  if (low !== null && Number(raw) < low) return Misfit.BelowLimit;
+  if (high !== null && Number(raw) > high) return Misfit.AboveLimit;
   const table = entry.enumeration === null ? undefined : doc.enumerations[entry.enumeration];
-  if (table?.exclusive && !table.values.some((one) => one.value === raw)) return misfit(Misfit.NotListed);
-  return { ok: true, raw };
+  if (table?.exclusive && !table.values.some((one) => one.value === raw)) return Misfit.NotListed;
+  return null;
+}
+
+/** Addresses of the objects that unit, limits and preconditions of an entry rest on. */
+export function restsOn(entry: EntryDoc): string[] {
+  const limits = [entry.minimum, entry.maximum].flatMap((limit) =>
+    limit !== null && typeof limit === "object" ? [limit.address] : [],
+  );
+  const unit = entry.unit_from === null ? [] : [entry.unit_from.address, entry.unit_from.shaft];
+  const found = [...limits, ...unit, ...entry.requires.map((one) => one.address)];
+  return [...new Set(found.filter((address): address is string => address !== null))];
 }
 
 function parseOctets(text: string): Parsed {
