@@ -36,8 +36,11 @@ async def search_bitrate(
     listen_s: float = SEARCH_LISTEN_S,
     on_try: Callable[[int], None] | None = None,
     monotonic_ns: Callable[[], int] = time.monotonic_ns,
+    on_heard: Callable[[int, int, int], None] | None = None,
 ) -> int:
-    """The first bit rate, in bit/s, at which valid frames come and no error frame; ``on_try`` is told each one tried.
+    """The first bit rate, in bit/s, at which valid frames come and no error frame.
+
+    ``on_try`` is told each one before it is tried, ``on_heard`` afterwards, with the frames and the error frames heard.
 
     Raises UsageError where it cannot be searched without disturbing the bus, BusOpenError where the adapter cannot be
     opened or no bit rate fits, BusLostError where the adapter goes meanwhile.
@@ -57,6 +60,8 @@ async def search_bitrate(
             # The adapter is there: it does not know this bit rate.
             heard.append(f"{bitrate}: {error.details['reason']}")
             continue
+        if on_heard is not None:
+            on_heard(bitrate, ear.frames, ear.errors)
         if ear.fits:
             return bitrate
         heard.append(f"{bitrate}: {ear}")

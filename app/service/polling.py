@@ -8,12 +8,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 from app.errors import AccessError, LimitError, UsageError
 from app.model.address import Address, parse_address
 from app.model.description import Description, Entry
 from app.service.journal import Journal, Kind
+from app.store.small_rows import get_setting, put_setting
+from app.store.store import Store
 
 KEY: Final = "polling"
 """Under this name the settings are kept."""
@@ -115,22 +117,12 @@ def read_bits(entry: Entry) -> int:
     return EXCHANGE_BITS * (1 + segments)
 
 
-class Keeper(Protocol):
-    """Where settings are kept, as JSON under a name."""
-
-    def get_setting(self, key: str) -> Any:
-        """What is kept, or None."""
-
-    def put_setting(self, key: str, document: Any) -> None:
-        """Keep it from now on."""
-
-
 class Polling:
-    """The plan in force. ``keeper`` None: it lasts as long as the bench. For the event loop."""
+    """The plan in force, kept in ``store``; without one it lasts as long as the bench. For the event loop."""
 
-    def __init__(self, keeper: Keeper | None = None) -> None:
-        self._keeper = keeper
-        kept = None if keeper is None else keeper.get_setting(KEY)
+    def __init__(self, store: Store | None = None) -> None:
+        self._store = store
+        kept = None if store is None else store.call(lambda connection: get_setting(connection, KEY))
         self._plan = USUAL if kept is None else plan_from(kept)
 
     @property
@@ -138,18 +130,18 @@ class Polling:
         """The plan."""
         return self._plan
 
-    def change(self, plan: PollPlan, known: Mapping[str, Description], journal: Journal) -> None:
+    async def change(self, plan: PollPlan, known: Mapping[str, Description], journal: Journal) -> None:
         """Put ``plan`` in force, keep it and note what changed. ``known`` by id must hold every device it names.
 
-        Raises UsageError, UnknownObjectError, AccessError, LimitError; then nothing has changed.
+        Raises UsageError, UnknownObjectError, AccessError, LimitError, StoreError; then nothing has changed.
         """
         plan = checked(plan, known)
-        before, self._plan = plan_document(self._plan), plan
-        after = plan_document(plan)
+        before, after = plan_document(self._plan), plan_document(plan)
         if before == after:
             return
-        if self._keeper is not None:
-            self._keeper.put_setting(KEY, after)
+        if self._store is not None:
+            await self._store.run(lambda connection: put_setting(connection, KEY, after))
+        self._plan = plan
         journal.note(Kind.SETTINGS_CHANGED, None, what_key="settings.polling", changes=changes_text(before, after))
 
 

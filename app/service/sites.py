@@ -15,12 +15,15 @@ Describe = Callable[[Turbine], Mapping[str, Description]]
 class Sites:
     """Turbines by slug.
 
-    ``file`` is the site file, or None where the start named a bus; ``describe`` gives the descriptions that a turbine's
-    devices name, by id, and raises DescriptionError.
+    ``file`` is the site file, or None where the start named a bus; ``home`` is where one may be made then. ``describe``
+    gives the descriptions that a turbine's devices name, by id, and raises DescriptionError.
     """
 
-    def __init__(self, turbines: tuple[Turbine, ...], describe: Describe, file: Path | None = None) -> None:
+    def __init__(
+        self, turbines: tuple[Turbine, ...], describe: Describe, file: Path | None = None, home: Path | None = None
+    ) -> None:
         self.file = file
+        self.home = home
         self.describe = describe
         self._turbines = {turbine.slug: turbine for turbine in turbines}
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from fastapi import APIRouter
 
 from app.web.deps import ANY_PROBLEM
-from app.web.routes import devices, jobs, recordings, session, sets, stop, turbine, writes
+from app.web.routes import audit, devices, jobs, recordings, session, sets, settings, stop, turbine, users, writes
 
-FEATURES = (session, turbine, devices, jobs, stop, writes, recordings, sets)
+FEATURES = (session, turbine, devices, jobs, stop, writes, recordings, sets, users, audit, settings)
 
 
 def api_router() -> APIRouter:

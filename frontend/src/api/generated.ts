@@ -4,6 +4,66 @@
  */
 
 export interface paths {
+    "/api/audit": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Audit Rows
+         * @description Rows, newest first. ``device`` may be a turbine or station too; ``kind`` may be named several times.
+         */
+        get: operations["audit_rows"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/audit/head": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Audit Head
+         * @description The end of the chain: who notes it can prove later that nothing before it was rewritten.
+         */
+        get: operations["audit_head"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/audit/verify": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Verify Audit
+         * @description Walk the whole chain and name the first row that is wrong.
+         */
+        post: operations["verify_audit"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/live/backup": {
         parameters: {
             query?: never;
@@ -38,6 +98,26 @@ export interface paths {
          * @description Connect to a turbine; the connection that there is ends first.
          */
         post: operations["connect"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/live/consent": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Consent
+         * @description Consent to active access beside another master, as agreed with its operator.
+         */
+        post: operations["consent"];
         delete?: never;
         options?: never;
         head?: never;
@@ -268,6 +348,66 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/login": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Login
+         * @description Open a session by name and password. After a few failures each further one must wait longer.
+         */
+        post: operations["login"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/logout": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Logout
+         * @description End the session; its sockets close.
+         */
+        post: operations["logout"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/password": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Change Own Password
+         * @description Change one's own password. All of one's sessions end.
+         */
+        post: operations["change_own_password"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/recordings": {
         parameters: {
             query?: never;
@@ -428,6 +568,234 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/settings/about": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * About
+         * @description The program: version, data folder, libraries with their licences.
+         */
+        get: operations["about"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/settings/adapters": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Adapters
+         * @description The adapters of this machine and of the site. Nothing is opened.
+         */
+        get: operations["adapters"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/settings/adapters/bitrate": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Start Search
+         * @description Find the bit rate by listening at one after the other, with an adapter that can be silent.
+         */
+        post: operations["start_search"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/settings/adapters/test": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Start Test
+         * @description Listen with an adapter for some seconds; nothing is sent.
+         */
+        post: operations["start_test"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/settings/jobs/{job_id}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Settings Job
+         * @description How the work on an adapter stands, with what it has found so far.
+         */
+        get: operations["settings_job"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/settings/polling": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Polling
+         * @description What is polled, how often, and how much of each known bus that takes.
+         */
+        get: operations["polling"];
+        /**
+         * Change Polling
+         * @description Change what is polled; in force with the next round.
+         */
+        put: operations["change_polling"];
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/settings/polling/choices/{description_id}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Poll Choices
+         * @description What can be read of such a device.
+         */
+        get: operations["poll_choices"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/settings/scan": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Start Scan
+         * @description Ask every node of a bus what it is.
+         */
+        post: operations["start_scan"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/settings/site": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Site
+         * @description The site file: turbines, buses, stations, devices.
+         */
+        get: operations["site"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/settings/site/turbines": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Add Turbine
+         * @description Add a turbine to the site file.
+         */
+        post: operations["add_turbine"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/settings/site/turbines/{slug}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        /**
+         * Change Turbine
+         * @description Change a turbine of the site file; slugs are permanent.
+         */
+        put: operations["change_turbine"];
+        post?: never;
+        /**
+         * Remove Turbine
+         * @description Take a turbine out of the site file; not the one that is connected.
+         */
+        delete: operations["remove_turbine"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/texts/{locale}": {
         parameters: {
             query?: never;
@@ -468,10 +836,106 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/users": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Users
+         * @description All users, disabled ones too.
+         */
+        get: operations["users"];
+        put?: never;
+        /**
+         * Add User
+         * @description Add a user. The first one is an expert, and ends what launch tokens opened: from then on one logs in.
+         */
+        post: operations["add_user"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/users/{user_id}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        /**
+         * Change User
+         * @description Change a user's role or password, shut the user out or let them in again. One expert must remain.
+         */
+        patch: operations["change_user"];
+        trace?: never;
+    };
 }
 export type webhooks = Record<string, never>;
 export interface components {
     schemas: {
+        /**
+         * AboutDoc
+         * @description The program: its version, where it keeps things, what it is made of.
+         */
+        AboutDoc: {
+            /** Data */
+            data: string | null;
+            /** Free Bytes */
+            free_bytes: number | null;
+            /** Libraries */
+            libraries: components["schemas"]["LibraryDoc"][];
+            /** Python */
+            python: string;
+            /** System */
+            system: string;
+            /** Version */
+            version: string;
+        };
+        /**
+         * AdapterDoc
+         * @description An adapter. ``connection`` is INTERFACE:CHANNEL; ``bitrates`` empty: any of CiA 301 is offered.
+         */
+        AdapterDoc: {
+            /** Bitrates */
+            bitrates: number[];
+            /** Connection */
+            connection: string;
+            /** Found */
+            found: boolean;
+            /** In Use */
+            in_use: boolean;
+            /** Interface */
+            interface: string;
+            /** Sets Bitrate */
+            sets_bitrate: boolean;
+            /** Silent */
+            silent: boolean;
+            /** Title */
+            title: string;
+            /** Turbines */
+            turbines: string[];
+        };
+        /**
+         * AdaptersDoc
+         * @description All adapters that are known, and where they were looked for.
+         */
+        AdaptersDoc: {
+            /** Adapters */
+            adapters: components["schemas"]["AdapterDoc"][];
+            /** Places */
+            places: components["schemas"]["PlaceDoc"][];
+        };
         /**
          * AttachmentRef
          * @description A file inside a recording.
@@ -483,6 +947,85 @@ export interface components {
             name: string;
             /** Size Bytes */
             size_bytes: number;
+        };
+        /**
+         * AuditHead
+         * @description The end of the chain; seq 0: nothing is written yet.
+         *
+         *     ``verified_t_ns`` is when the whole chain was last found good. ``waiting`` rows are not on the disk yet;
+         *     ``failing``: the store cannot be written.
+         */
+        AuditHead: {
+            /** Failing */
+            failing: boolean;
+            /** Hash */
+            hash: string;
+            /** Seq */
+            seq: number;
+            /** Verified T Ns */
+            verified_t_ns: number | null;
+            /** Waiting */
+            waiting: number;
+        };
+        /**
+         * AuditLine
+         * @description One row. ``text_key`` with ``details`` is its text; ``device`` is a slug, ``address`` that of a parameter.
+         */
+        AuditLine: {
+            /** Address */
+            address: string | null;
+            /** Details */
+            details: {
+                [key: string]: unknown;
+            };
+            /** Device */
+            device: string | null;
+            /** Hash */
+            hash: string;
+            /** Id */
+            id: string;
+            /** Kind */
+            kind: string;
+            /** Person */
+            person: string;
+            /** Seq */
+            seq: number;
+            /** T Ns */
+            t_ns: number;
+            /** Text Key */
+            text_key: string;
+        };
+        /**
+         * AuditPage
+         * @description Rows, newest first. ``before`` asks for the page behind this one; null: there is none.
+         */
+        AuditPage: {
+            /** Before */
+            before: number | null;
+            /** Rows */
+            rows: components["schemas"]["AuditLine"][];
+        };
+        /**
+         * AuditVerified
+         * @description A walk over the chain. ``broken_seq`` is the first row that is wrong, ``breach_key`` the text that says how.
+         */
+        AuditVerified: {
+            /** Breach */
+            breach: ("missing" | "previous" | "changed" | "end") | null;
+            /** Breach Key */
+            breach_key: string | null;
+            /** Broken Seq */
+            broken_seq: number | null;
+            /** Good */
+            good: boolean;
+            /** Head Hash */
+            head_hash: string;
+            /** Head Seq */
+            head_seq: number;
+            /** Rows */
+            rows: number;
+            /** T Ns */
+            t_ns: number;
         };
         /**
          * AxesMessage
@@ -623,6 +1166,18 @@ export interface components {
             v: 1;
         };
         /**
+         * BusDoc
+         * @description A bus of a turbine; ``bitrate`` 0: the connection names it.
+         */
+        BusDoc: {
+            /** Bitrate */
+            bitrate: number;
+            /** Connection */
+            connection: string;
+            /** Name */
+            name: string;
+        };
+        /**
          * BusRef
          * @description The bus; ``interface`` is the adapter as it was named.
          */
@@ -668,6 +1223,16 @@ export interface components {
             offset: number;
             /** Reason */
             reason: string;
+        };
+        /**
+         * DescriptionRef
+         * @description A description that devices may name.
+         */
+        DescriptionRef: {
+            /** Id */
+            id: string;
+            /** Name */
+            name: string;
         };
         /**
          * DeviceRef
@@ -764,6 +1329,73 @@ export interface components {
             severity: "warning" | "error";
             /** Text Key */
             text_key: string | null;
+        };
+        /**
+         * FoundDoc
+         * @description A device that answered, and where it might belong; null where it does not say.
+         */
+        FoundDoc: {
+            /** Blade */
+            blade: number | null;
+            /** Description Id */
+            description_id: string | null;
+            /** Device */
+            device: string;
+            /** Device Name */
+            device_name: string | null;
+            /** Device Type */
+            device_type: number | null;
+            /** Hardware */
+            hardware: string | null;
+            /** Node */
+            node: number;
+            /** Product */
+            product: number | null;
+            /** Revision */
+            revision: number | null;
+            /** Serial */
+            serial: number | null;
+            /** Software */
+            software: string | null;
+            /** Station */
+            station: string;
+            /** Twin */
+            twin: boolean;
+            /** Vendor */
+            vendor: number | null;
+        };
+        /**
+         * HeardDoc
+         * @description What a test has heard so far; ``load`` 0..1.
+         */
+        HeardDoc: {
+            /** Bitrate */
+            bitrate: number;
+            /** Connection */
+            connection: string;
+            /** Errors */
+            errors: number;
+            /** Frames */
+            frames: number;
+            /** Frames Per S */
+            frames_per_s: number;
+            /** Heard S */
+            heard_s: number;
+            /** Load */
+            load: number;
+            /** Masters */
+            masters: components["schemas"]["MasterDoc"][];
+            /** Nodes */
+            nodes: number[];
+            /** Shared */
+            shared: boolean;
+            /** Silent */
+            silent: boolean;
+            /**
+             * Verdict
+             * @enum {string}
+             */
+            verdict: "listening" | "fits" | "errors" | "silent";
         };
         /**
          * HeartbeatMessage
@@ -896,6 +1528,18 @@ export interface components {
             slug: string;
         };
         /**
+         * LibraryDoc
+         * @description A library that the program is made of.
+         */
+        LibraryDoc: {
+            /** Licence */
+            licence: string;
+            /** Name */
+            name: string;
+            /** Version */
+            version: string;
+        };
+        /**
          * LinkLine
          * @description The connection as a whole. With several buses: the state of the worst one, and the highest load.
          */
@@ -915,6 +1559,8 @@ export interface components {
              * @enum {string}
              */
             mode: "live" | "twin" | "none";
+            /** Needs Consent */
+            needs_consent: boolean;
             /** Other Masters */
             other_masters: components["schemas"]["MasterLine"][];
             /** Reason */
@@ -955,6 +1601,37 @@ export interface components {
             v: 1;
         };
         /**
+         * LoginDone
+         * @description Who is signed in now; the session is the cookie's.
+         */
+        LoginDone: {
+            /** Person */
+            person: string;
+            /**
+             * Role
+             * @enum {string}
+             */
+            role: "viewer" | "technician" | "expert";
+            /** User */
+            user: string;
+        };
+        /**
+         * LoginRequest
+         * @description Who wants to be let in.
+         */
+        LoginRequest: {
+            /**
+             * Name
+             * @example Jo Berg
+             */
+            name: string;
+            /**
+             * Password
+             * @example correct horse battery
+             */
+            password: string;
+        };
+        /**
          * LossRef
          * @description An event that tells of frames that are missing; ``text_key`` with ``details`` is its text.
          */
@@ -967,6 +1644,18 @@ export interface components {
             t_ns: number;
             /** Text Key */
             text_key: string;
+        };
+        /**
+         * MasterDoc
+         * @description Another master, by the frame that gave it away.
+         */
+        MasterDoc: {
+            /** Can Id */
+            can_id: number;
+            /** Sign */
+            sign: string;
+            /** Times */
+            times: number;
         };
         /**
          * MasterLine
@@ -983,6 +1672,28 @@ export interface components {
             sign: string;
             /** T Ns */
             t_ns: number;
+        };
+        /**
+         * NewUser
+         * @description A user to be made. The first one is an expert, whatever role is named.
+         */
+        NewUser: {
+            /**
+             * Name
+             * @example Jo Berg
+             */
+            name: string;
+            /**
+             * Password
+             * @example correct horse battery
+             */
+            password: string;
+            /**
+             * Role
+             * @default viewer
+             * @enum {string}
+             */
+            role: "viewer" | "technician" | "expert";
         };
         /**
          * NodeLine
@@ -1042,6 +1753,153 @@ export interface components {
          */
         Nothing: Record<string, never>;
         /**
+         * OwnPassword
+         * @description The password of who asks; all their sessions end, this one too.
+         */
+        OwnPassword: {
+            /**
+             * New
+             * @example correct horse battery
+             */
+            new: string;
+            /**
+             * Old
+             * @example correct horse battery
+             */
+            old: string;
+        };
+        /**
+         * PlaceDoc
+         * @description One kind of adapter, and how the look for it ended.
+         */
+        PlaceDoc: {
+            /** Found */
+            found: number;
+            /**
+             * Health
+             * @enum {string}
+             */
+            health: "ok" | "no_driver" | "failed" | "timed_out" | "unsupported";
+            /** Interface */
+            interface: string;
+            /** Reason */
+            reason: string;
+        };
+        /**
+         * PollBus
+         * @description A bus of a known turbine, and how much of its time polling takes (0..1); ``counts`` of devices by description.
+         */
+        PollBus: {
+            /** Bitrate */
+            bitrate: number;
+            /** Bus */
+            bus: string;
+            /** Counts */
+            counts: {
+                [key: string]: number;
+            };
+            /** Load */
+            load: number;
+            /** Turbine */
+            turbine: string;
+        };
+        /**
+         * PollChoice
+         * @description An object that can be read.
+         */
+        PollChoice: {
+            /** Address */
+            address: string;
+            /** Bits */
+            bits: number;
+            /** Group */
+            group: string;
+            /** Name */
+            name: string;
+        };
+        /**
+         * PollDevice
+         * @description What is read of one kind of device.
+         */
+        PollDevice: {
+            /** Description Id */
+            description_id: string;
+            /** Items */
+            items: components["schemas"]["PollItem"][];
+            /** Name */
+            name: string;
+            /** Usual */
+            usual: boolean;
+        };
+        /**
+         * PollItem
+         * @description An object that is read; ``bits`` is what reading it takes on the bus. ``usual`` null: it is not usual.
+         */
+        PollItem: {
+            /** Address */
+            address: string;
+            /** Bits */
+            bits: number;
+            /** Name */
+            name: string;
+            /**
+             * Rate
+             * @enum {string}
+             */
+            rate: "fast" | "slow" | "rare";
+            /** Usual */
+            usual: ("fast" | "slow" | "rare") | null;
+        };
+        /**
+         * PollingChange
+         * @description The polling list as it is to be; devices that are not named get the usual list.
+         * @example {
+         *       "devices": {
+         *         "oat-pmm": {
+         *           "3110:01": "slow"
+         *         }
+         *       },
+         *       "load_cap": 0.6,
+         *       "period_s": 0.1,
+         *       "rare_every": 100,
+         *       "slow_every": 10
+         *     }
+         */
+        PollingChange: {
+            /** Devices */
+            devices: {
+                [key: string]: {
+                    [key: string]: "fast" | "slow" | "rare";
+                };
+            };
+            /** Load Cap */
+            load_cap: number;
+            /** Period S */
+            period_s: number;
+            /** Rare Every */
+            rare_every: number;
+            /** Slow Every */
+            slow_every: number;
+        };
+        /**
+         * PollingDoc
+         * @description The polling list in force.
+         */
+        PollingDoc: {
+            /** Buses */
+            buses: components["schemas"]["PollBus"][];
+            /** Devices */
+            devices: components["schemas"]["PollDevice"][];
+            /** Load Cap */
+            load_cap: number;
+            /** Period S */
+            period_s: number;
+            /** Rare Every */
+            rare_every: number;
+            /** Slow Every */
+            slow_every: number;
+        };
+        /**
          * Problem
          * @description What went wrong (RFC 9457): ``text_key`` with ``details`` is the operator's text.
          */
@@ -1062,6 +1920,18 @@ export interface components {
             title: string;
             /** Type */
             type: string;
+        };
+        /**
+         * RateTriedDoc
+         * @description One bit rate of a search.
+         */
+        RateTriedDoc: {
+            /** Bitrate */
+            bitrate: number;
+            /** Errors */
+            errors: number;
+            /** Frames */
+            frames: number;
         };
         /**
          * ReadRequest
@@ -1202,10 +2072,72 @@ export interface components {
             /** Took S */
             took_s: number;
         };
+        /**
+         * ScanDoc
+         * @description What a scan found.
+         */
+        ScanDoc: {
+            /** Bitrate */
+            bitrate: number;
+            /** Connection */
+            connection: string;
+            /** Found */
+            found: components["schemas"]["FoundDoc"][];
+        };
+        /**
+         * ScanRequest
+         * @description ``consent``: ask the devices although another master is on the bus.
+         * @example {
+         *       "connection": "socketcan:can0"
+         *     }
+         */
+        ScanRequest: {
+            /**
+             * Bitrate
+             * @default 500000
+             */
+            bitrate: number;
+            /** Connection */
+            connection: string;
+            /**
+             * Consent
+             * @default false
+             */
+            consent: boolean;
+        };
+        /**
+         * SearchDoc
+         * @description A search for the bit rate so far.
+         */
+        SearchDoc: {
+            /** Bitrate */
+            bitrate: number | null;
+            /** Connection */
+            connection: string;
+            /** Rates */
+            rates: number[];
+            /** Tried */
+            tried: components["schemas"]["RateTriedDoc"][];
+            /** Trying */
+            trying: number | null;
+        };
+        /**
+         * SearchRequest
+         * @description Which adapter.
+         * @example {
+         *       "connection": "slcan:/dev/ttyACM0"
+         *     }
+         */
+        SearchRequest: {
+            /** Connection */
+            connection: string;
+        };
         ServerMessage: components["schemas"]["HelloMessage"] | components["schemas"]["BenchMessage"] | components["schemas"]["HeartbeatMessage"] | components["schemas"]["LinkMessage"] | components["schemas"]["NodesMessage"] | components["schemas"]["AxesMessage"] | components["schemas"]["ValuesMessage"] | components["schemas"]["EventMessage"];
         /**
          * Session
          * @description Who is served, and in which languages. ``user`` is null where a launch token opened the session.
+         *
+         *     ``login_needed``: users exist, so nobody gets in without a login.
          */
         Session: {
             /** Languages */
@@ -1215,6 +2147,8 @@ export interface components {
              * @enum {string}
              */
             locale: "en" | "de";
+            /** Login Needed */
+            login_needed: boolean;
             /** Person */
             person: string;
             /**
@@ -1336,6 +2270,120 @@ export interface components {
             size_bytes: number;
         };
         /**
+         * SettingsJobDoc
+         * @description Work on an adapter. One of ``heard``, ``search`` and ``scan`` is given as soon as there is anything to tell.
+         */
+        SettingsJobDoc: {
+            /** Done */
+            done: number;
+            error: components["schemas"]["Failure"] | null;
+            heard: components["schemas"]["HeardDoc"] | null;
+            /** Id */
+            id: string;
+            /** Kind */
+            kind: string;
+            scan: components["schemas"]["ScanDoc"] | null;
+            search: components["schemas"]["SearchDoc"] | null;
+            /**
+             * State
+             * @enum {string}
+             */
+            state: "running" | "done" | "failed" | "cancelled";
+            /** Total */
+            total: number;
+        };
+        /**
+         * SiteDeviceDoc
+         * @description A device; ``slug`` is its own part of the path.
+         */
+        SiteDeviceDoc: {
+            /** Bus */
+            bus: string;
+            /** Description Id */
+            description_id: string;
+            /** Name */
+            name: string;
+            /** Node */
+            node: number;
+            /** Slug */
+            slug: string;
+        };
+        /**
+         * SiteDoc
+         * @description The site file. ``made`` false: the first change makes it; ``problem`` (a text key): nothing can be changed.
+         */
+        SiteDoc: {
+            /** Connected */
+            connected: string | null;
+            /** Descriptions */
+            descriptions: components["schemas"]["DescriptionRef"][];
+            /** File */
+            file: string | null;
+            /** Made */
+            made: boolean;
+            /** Problem */
+            problem: string | null;
+            /** Revision */
+            revision: string;
+            /** Turbines */
+            turbines: components["schemas"]["SiteTurbineDoc"][];
+        };
+        /**
+         * SiteStationDoc
+         * @description A blade (1 to 3) or a bench (null); ``slug`` is its own part of the path.
+         */
+        SiteStationDoc: {
+            /** Blade */
+            blade: number | null;
+            /** Devices */
+            devices: components["schemas"]["SiteDeviceDoc"][];
+            /** Name */
+            name: string;
+            /** Slug */
+            slug: string;
+        };
+        /**
+         * SiteTurbineDoc
+         * @description A turbine of the site file.
+         * @example {
+         *       "buses": [
+         *         {
+         *           "bitrate": 500000,
+         *           "connection": "socketcan:can0",
+         *           "name": "can0"
+         *         }
+         *       ],
+         *       "name": "WTG-08",
+         *       "slug": "wtg-08",
+         *       "stations": [
+         *         {
+         *           "blade": 1,
+         *           "devices": [
+         *             {
+         *               "bus": "can0",
+         *               "description_id": "oat-pmm",
+         *               "name": "PMM",
+         *               "node": 1,
+         *               "slug": "pmm"
+         *             }
+         *           ],
+         *           "name": "blade 1",
+         *           "slug": "blade-1"
+         *         }
+         *       ]
+         *     }
+         */
+        SiteTurbineDoc: {
+            /** Buses */
+            buses: components["schemas"]["BusDoc"][];
+            /** Name */
+            name: string;
+            /** Slug */
+            slug: string;
+            /** Stations */
+            stations: components["schemas"]["SiteStationDoc"][];
+        };
+        /**
          * StationRef
          * @description A blade, or a bench (``blade`` null).
          */
@@ -1371,6 +2419,27 @@ export interface components {
             state: "proven" | "saved";
         };
         /**
+         * TestRequest
+         * @description ``sure``: the bit rate is known, so an adapter without a silent mode may listen at it.
+         * @example {
+         *       "connection": "socketcan:can0"
+         *     }
+         */
+        TestRequest: {
+            /**
+             * Bitrate
+             * @default 500000
+             */
+            bitrate: number;
+            /** Connection */
+            connection: string;
+            /**
+             * Sure
+             * @default false
+             */
+            sure: boolean;
+        };
+        /**
          * Turbine
          * @description The connected turbine.
          */
@@ -1387,6 +2456,48 @@ export interface components {
             slug: string;
             /** Stations */
             stations: components["schemas"]["StationRef"][];
+        };
+        /**
+         * TurbineChange
+         * @description A turbine as it is to be; ``revision`` is that of the file that the person saw.
+         */
+        TurbineChange: {
+            /** Revision */
+            revision: string;
+            turbine: components["schemas"]["SiteTurbineDoc"];
+        };
+        /**
+         * UserChange
+         * @description What is to change; null stays as it is. Another password or ``disabled`` ends the user's sessions.
+         */
+        UserChange: {
+            /** Disabled */
+            disabled?: boolean | null;
+            /** Password */
+            password?: string | null;
+            /** Role */
+            role?: ("viewer" | "technician" | "expert") | null;
+        };
+        /**
+         * UserDoc
+         * @description A user. ``you``: the one who asks.
+         */
+        UserDoc: {
+            /** Created Ns */
+            created_ns: number;
+            /** Disabled */
+            disabled: boolean;
+            /** Id */
+            id: string;
+            /** Name */
+            name: string;
+            /**
+             * Role
+             * @enum {string}
+             */
+            role: "viewer" | "technician" | "expert";
+            /** You */
+            you: boolean;
         };
         /**
          * ValueCell
@@ -1518,6 +2629,107 @@ export interface components {
 }
 export type $defs = Record<string, never>;
 export interface operations {
+    audit_rows: {
+        parameters: {
+            query?: {
+                before?: number | null;
+                limit?: number;
+                device?: string | null;
+                kind?: string[] | null;
+                person?: string | null;
+                q?: string | null;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["AuditPage"];
+                };
+            };
+            /** @description What went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                    "application/problem+json": unknown;
+                };
+            };
+        };
+    };
+    audit_head: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["AuditHead"];
+                };
+            };
+            /** @description What went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                    "application/problem+json": unknown;
+                };
+            };
+        };
+    };
+    verify_audit: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["Nothing"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["AuditVerified"];
+                };
+            };
+            /** @description What went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                    "application/problem+json": unknown;
+                };
+            };
+        };
+    };
     backup: {
         parameters: {
             query?: never;
@@ -1572,6 +2784,40 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["Turbine"];
+                };
+            };
+            /** @description What went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                    "application/problem+json": unknown;
+                };
+            };
+        };
+    };
+    consent: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["Nothing"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Nothing"];
                 };
             };
             /** @description What went wrong */
@@ -2002,6 +3248,108 @@ export interface operations {
             };
         };
     };
+    login: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["LoginRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["LoginDone"];
+                };
+            };
+            /** @description What went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                    "application/problem+json": unknown;
+                };
+            };
+        };
+    };
+    logout: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["Nothing"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Nothing"];
+                };
+            };
+            /** @description What went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                    "application/problem+json": unknown;
+                };
+            };
+        };
+    };
+    change_own_password: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["OwnPassword"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Nothing"];
+                };
+            };
+            /** @description What went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                    "application/problem+json": unknown;
+                };
+            };
+        };
+    };
     recordings: {
         parameters: {
             query?: never;
@@ -2250,6 +3598,430 @@ export interface operations {
             };
         };
     };
+    about: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["AboutDoc"];
+                };
+            };
+            /** @description What went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                    "application/problem+json": unknown;
+                };
+            };
+        };
+    };
+    adapters: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["AdaptersDoc"];
+                };
+            };
+            /** @description What went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                    "application/problem+json": unknown;
+                };
+            };
+        };
+    };
+    start_search: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["SearchRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SettingsJobDoc"];
+                };
+            };
+            /** @description What went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                    "application/problem+json": unknown;
+                };
+            };
+        };
+    };
+    start_test: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["TestRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SettingsJobDoc"];
+                };
+            };
+            /** @description What went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                    "application/problem+json": unknown;
+                };
+            };
+        };
+    };
+    settings_job: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                job_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SettingsJobDoc"];
+                };
+            };
+            /** @description What went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                    "application/problem+json": unknown;
+                };
+            };
+        };
+    };
+    polling: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["PollingDoc"];
+                };
+            };
+            /** @description What went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                    "application/problem+json": unknown;
+                };
+            };
+        };
+    };
+    change_polling: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["PollingChange"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["PollingDoc"];
+                };
+            };
+            /** @description What went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                    "application/problem+json": unknown;
+                };
+            };
+        };
+    };
+    poll_choices: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                description_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["PollChoice"][];
+                };
+            };
+            /** @description What went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                    "application/problem+json": unknown;
+                };
+            };
+        };
+    };
+    start_scan: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["ScanRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SettingsJobDoc"];
+                };
+            };
+            /** @description What went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                    "application/problem+json": unknown;
+                };
+            };
+        };
+    };
+    site: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SiteDoc"];
+                };
+            };
+            /** @description What went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                    "application/problem+json": unknown;
+                };
+            };
+        };
+    };
+    add_turbine: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["TurbineChange"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SiteDoc"];
+                };
+            };
+            /** @description What went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                    "application/problem+json": unknown;
+                };
+            };
+        };
+    };
+    change_turbine: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                slug: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["TurbineChange"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SiteDoc"];
+                };
+            };
+            /** @description What went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                    "application/problem+json": unknown;
+                };
+            };
+        };
+    };
+    remove_turbine: {
+        parameters: {
+            query: {
+                revision: string;
+            };
+            header?: never;
+            path: {
+                slug: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SiteDoc"];
+                };
+            };
+            /** @description What went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                    "application/problem+json": unknown;
+                };
+            };
+        };
+    };
     texts: {
         parameters: {
             query?: never;
@@ -2300,6 +4072,106 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["KnownTurbine"][];
+                };
+            };
+            /** @description What went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                    "application/problem+json": unknown;
+                };
+            };
+        };
+    };
+    users: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["UserDoc"][];
+                };
+            };
+            /** @description What went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                    "application/problem+json": unknown;
+                };
+            };
+        };
+    };
+    add_user: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["NewUser"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["UserDoc"];
+                };
+            };
+            /** @description What went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                    "application/problem+json": unknown;
+                };
+            };
+        };
+    };
+    change_user: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                user_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["UserChange"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["UserDoc"];
                 };
             };
             /** @description What went wrong */
