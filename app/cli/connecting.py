@@ -72,14 +72,18 @@ async def make_bench(arguments: argparse.Namespace, output: Output, record: bool
     sheets = sheets_of(arguments, output)
     home: Path = arguments.settings.data / "site.toml"
     if arguments.can is not None:
-        first: Turbine | None = await _turbine_with_devices(arguments, output, sheets)
-        known: tuple[Turbine, ...] = (first,)
+        turbine = await _turbine_with_devices(arguments, output, sheets)
+        known, first = _only(turbine)
     else:
         known, first = _from_site_file(arguments, home)
     sites = Sites(known, lambda one: descriptions_for(sheets, one, arguments.site), arguments.site, home)
     spare_collector()
     bench = Bench(sites, options_of(arguments, record), output.error, store=store)
     return None if first is None else first.slug, bench
+
+
+def _only(turbine: Turbine) -> tuple[tuple[Turbine, ...], Turbine | None]:
+    return (turbine,), turbine
 
 
 def _from_site_file(arguments: argparse.Namespace, home: Path) -> tuple[tuple[Turbine, ...], Turbine | None]:
