@@ -44,10 +44,10 @@ class Change:
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """A batch as a person confirmed it. ``save``: make each device's values permanent that has verified writes."""
+    """A batch as a person confirmed it. ``save``: slugs of the devices whose verified values are made permanent."""
 
     changes: Sequence[Change]
-    save: bool
+    save: frozenset[str]
     on_failure: OnFailure
     allow: Allow = Allow.NOTHING
 
@@ -84,8 +84,8 @@ async def write_many(job: Job, order: Order, journal: Journal, now_ns: Callable[
             job.done += 1
             if _ends(row, order.on_failure):
                 return
-    if order.save:
-        for slug in devices:
+    for slug in devices:
+        if slug in order.save:
             own = [(change, row) for change, row in rows if change.target.slug == slug]
             await _whole(_save(own, journal, now_ns))
 

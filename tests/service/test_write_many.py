@@ -61,7 +61,7 @@ def errors(job: Job) -> list[type[HubsideError] | None]:
 
 
 def order(changes: Sequence[Change], save: bool = False, on_failure: OnFailure = OnFailure.STOP) -> Order:
-    return Order(changes, save, on_failure)
+    return Order(changes, frozenset(PMMS if save else ()), on_failure)
 
 
 async def test_rows_of_three_blades_are_written_verified_and_saved(connection: Connection) -> None:
@@ -146,7 +146,7 @@ async def test_a_row_may_rest_on_a_row_before_it(connection: Connection) -> None
 async def test_what_only_the_maker_sets_needs_the_permission(connection: Connection, served: Served) -> None:
     rows = [change(connection, PMMS[0], FACTORY, 1)]
     assert states(await run(connection, order(rows))) == [RowState.REFUSED]
-    allowed = await run(connection, Order(rows, save=False, on_failure=OnFailure.STOP, allow=Allow.FACTORY))
+    allowed = await run(connection, Order(rows, save=frozenset(), on_failure=OnFailure.STOP, allow=Allow.FACTORY))
     # The twin, as the device, refuses it all the same.
     assert errors(allowed) == [SdoAbortError]
 

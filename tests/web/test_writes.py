@@ -38,7 +38,7 @@ async def written(server: Server, body: dict[str, Any]) -> dict[str, Any]:
 
 
 async def test_a_batch_is_written_verified_and_saved_row_by_row(server: Server) -> None:
-    job = await written(server, {"rows": [row(slug, 490, 500) for slug in PMMS], "save": True})
+    job = await written(server, {"rows": [row(slug, 490, 500) for slug in PMMS], "save": PMMS})
     assert (job["state"], job["kind"], job["done"], job["total"]) == ("done", "write", 3, 3)
     for slug, found in zip(PMMS, job["rows"], strict=True):
         assert found == {
@@ -52,7 +52,7 @@ async def test_a_batch_is_written_verified_and_saved_row_by_row(server: Server) 
 
 
 async def test_a_conflict_names_what_stands_there_now(server: Server) -> None:
-    body = {"rows": [row(PMMS[0], 490, 520), row(PMMS[1], 490, 500)], "save": False, "on_failure": "go-on"}
+    body = {"rows": [row(PMMS[0], 490, 520), row(PMMS[1], 490, 500)], "save": [], "on_failure": "go-on"}
     job = await written(server, body)
     assert [one["state"] for one in job["rows"]] == ["refused", "verified"]
     error = job["rows"][0]["error"]
@@ -62,19 +62,19 @@ async def test_a_conflict_names_what_stands_there_now(server: Server) -> None:
 
 async def test_refused_rows_tell_why_and_keep_the_rest_from_being_sent(server: Server) -> None:
     rows = [row(PMMS[0], 490), row(PMMS[1], 40_000), row(PMMS[2], 1, address="30F1:01")]
-    job = await written(server, {"rows": rows, "save": True})
+    job = await written(server, {"rows": rows, "save": PMMS})
     assert [one["state"] for one in job["rows"]] == ["waiting", "refused", "refused"]
     assert [one["error"] and one["error"]["code"] for one in job["rows"]] == [None, "limit", "access"]
 
 
 WHOLE: list[tuple[dict[str, Any], int, str]] = [
-    ({"rows": [], "save": False}, 422, "invalid"),
-    ({"rows": [row(PMMS[0], 1)] * 501, "save": False}, 422, "invalid"),
-    ({"rows": [row(PMMS[0], 1)], "save": False, "on_failure": "never"}, 422, "invalid"),
-    ({"rows": [row(PMMS[0], 490), row(PMMS[0], 480)], "save": False}, 400, "usage"),
-    ({"rows": [row("wtg-07/blade-9/pmm", 490)], "save": False}, 404, "not_found"),
-    ({"rows": [row(PMMS[0], 490, address="2222")], "save": False}, 404, "unknown_object"),
-    ({"rows": [row(PMMS[0], "hot")], "save": False}, 422, "value_type"),
+    ({"rows": [], "save": []}, 422, "invalid"),
+    ({"rows": [row(PMMS[0], 1)] * 501, "save": []}, 422, "invalid"),
+    ({"rows": [row(PMMS[0], 1)], "save": [], "on_failure": "never"}, 422, "invalid"),
+    ({"rows": [row(PMMS[0], 490), row(PMMS[0], 480)], "save": []}, 400, "usage"),
+    ({"rows": [row("wtg-07/blade-9/pmm", 490)], "save": []}, 404, "not_found"),
+    ({"rows": [row(PMMS[0], 490, address="2222")], "save": []}, 404, "unknown_object"),
+    ({"rows": [row(PMMS[0], "hot")], "save": []}, 422, "value_type"),
 ]
 
 
@@ -85,5 +85,5 @@ async def test_a_batch_that_makes_no_sense_is_refused_as_a_whole(server: Server)
 
 
 async def test_a_stranger_writes_nothing(server: Server) -> None:
-    answer = await server.stranger.post("/api/live/writes", json={"rows": [row(PMMS[0], 490)], "save": False})
+    answer = await server.stranger.post("/api/live/writes", json={"rows": [row(PMMS[0], 490)], "save": []})
     assert answer.status_code == 401

@@ -21,10 +21,10 @@ class WritesRow(BaseModel):
 
 
 class WritesRequest(BaseModel):
-    """``save`` makes each device's values permanent that has verified writes; with "stop" nothing follows a failure."""
+    """``save`` names the devices whose verified values are made permanent; with "stop" nothing follows a failure."""
 
     model_config = ConfigDict(extra="forbid")
 
     rows: Annotated[list[WritesRow], Field(min_length=1, max_length=500)]
-    save: bool
+    save: Annotated[list[Annotated[str, Field(max_length=200)]], Field(max_length=100)]
     on_failure: Literal["stop", "go-on"] = "stop"

@@ -27,7 +27,7 @@ async def writes(
     """Check, write, read back and save in the background. What only the maker sets needs an expert."""
     allow = Allow.FACTORY if person.role.covers(Role.EXPERT) else Allow.NOTHING
     changes = [_change(connection, row) for row in request.rows]
-    order = Order(changes, request.save, OnFailure(request.on_failure), allow)
+    order = Order(changes, frozenset(request.save), OnFailure(request.on_failure), allow)
 
     async def work(job: Job) -> None:
         await write_many(job, order, journal, connection.stamper)

@@ -2592,7 +2592,7 @@ export interface components {
         };
         /**
          * WritesRequest
-         * @description ``save`` makes each device's values permanent that has verified writes; with "stop" nothing follows a failure.
+         * @description ``save`` names the devices whose verified values are made permanent; with "stop" nothing follows a failure.
          */
         WritesRequest: {
             /**
@@ -2604,7 +2604,7 @@ export interface components {
             /** Rows */
             rows: components["schemas"]["WritesRow"][];
             /** Save */
-            save: boolean;
+            save: string[];
         };
         /**
          * WritesRow
