@@ -22,6 +22,16 @@ export class Problem extends Error {
 /** The server did not answer at all. */
 export class Unreachable extends Error {}
 
+const UNAUTHORISED = 401;
+/** Here a refusal says nothing new of the session. */
+const SIGNING_IN = ["/api/session", "/api/login"];
+let tellSignedOut: () => void = () => undefined;
+
+/** Calls `told` where the server no longer knows the session: it has ended, or another login is needed. */
+export function onSignedOut(told: () => void): void {
+  tellSignedOut = told;
+}
+
 async function request<T>(path: string, init: RequestInit): Promise<T> {
   let response: Response;
   try {
@@ -29,6 +39,7 @@ async function request<T>(path: string, init: RequestInit): Promise<T> {
   } catch (cause) {
     throw new Unreachable(path, { cause });
   }
+  if (response.status === UNAUTHORISED && !SIGNING_IN.includes(path)) tellSignedOut();
   if (!response.ok) throw new Problem(await problemOf(response));
   return (await response.json()) as T;
 }
@@ -56,12 +67,20 @@ export function get<T>(path: string, signal?: AbortSignal): Promise<T> {
   return request<T>(path, { method: "GET", ...(signal ? { signal } : {}) });
 }
 
-function post<T>(path: string, body: object): Promise<T> {
+export function send<T>(method: "POST" | "PUT" | "PATCH", path: string, body: object): Promise<T> {
   return request<T>(path, {
-    method: "POST",
+    method,
     headers: { "content-type": "application/json" },
     body: JSON.stringify(body),
   });
+}
+
+export function remove<T>(path: string): Promise<T> {
+  return request<T>(path, { method: "DELETE" });
+}
+
+function post<T>(path: string, body: object): Promise<T> {
+  return send<T>("POST", path, body);
 }
 
 const device = (slug: string) => `/api/live/devices/${slug}`;

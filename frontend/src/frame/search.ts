@@ -39,6 +39,10 @@ export interface PageSearch {
   eventq?: string;
   severity?: string;
   drawer?: string;
+  /** Section of the settings, and the filters of its audit log. */
+  section?: string;
+  person?: string;
+  kind?: string;
 }
 
 const TEXTS = [
@@ -56,6 +60,9 @@ const TEXTS = [
   "eventq",
   "severity",
   "drawer",
+  "section",
+  "person",
+  "kind",
 ] as const;
 
 /** Takes what is valid and leaves the rest: a damaged link opens the page all the same. */
