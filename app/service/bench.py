@@ -60,7 +60,7 @@ class Bench:
         self.journal = journal or Journal(self.stamper, options.person)
         self.office = Office(store or Store.in_memory(), self.journal, self.stamper, options.person)
         self.site_editor = SiteEditor(sites)
-        self.polling = Polling()
+        self.polling = Polling(self.office.store)
         self.connection: Connection | None = None
         self.twins: TwinWatch | None = None
         self.epoch = 0

@@ -1,1 +1,1 @@
-"""What is kept: parameter sets, motors, incidents, users, audit."""
+"""What is kept: users, sessions, visits, the audit log, favourites and settings, in one SQLite file."""

@@ -10,7 +10,6 @@ from pathlib import Path
 from fastapi import FastAPI, Request, Response, WebSocket
 
 from app import __version__
-from app.model.roles import Role, SignedIn
 from app.model.texts import load_texts
 from app.scene.hub import HubScene
 from app.service.bench import Bench
@@ -18,7 +17,7 @@ from app.service.jobs import Jobs
 from app.service.scene_feed import run_scene
 from app.web import problem
 from app.web.access import Access
-from app.web.guard import Guard
+from app.web.guard import LOOPBACK_NAMES, Guard, Reach
 from app.web.problem import NotFoundError
 from app.web.routes import api_router
 from app.web.socket import serve_client
@@ -33,9 +32,14 @@ def create_app(
     scene: HubScene | None = None,
     language: str = "en",
     page: Path | None = None,
+    reach: Reach | None = None,
 ) -> Guard:
-    """The guarded application. ``port`` is the one that it will listen on; ``page`` is the folder of the built page."""
+    """The guarded application. ``port`` is the one that it will listen on; ``page`` is the folder of the built page.
+
+    ``reach`` None: the loopback address alone.
+    """
     app = create_api(bench, scene, language)
+    app.state.access = access
     files = PageFiles(page or page_folder())
 
     @app.websocket("/api/ws")
@@ -52,8 +56,8 @@ def create_app(
             raise NotFoundError(what=request.url.path)
         return answer
 
-    person = SignedIn(bench.options.person, Role.TECHNICIAN)
-    return Guard(app, access, port, load_texts(language)("error.unauthorised"), person)
+    reach = reach or Reach.of(LOOPBACK_NAMES, port, False)
+    return Guard(app, access, reach, load_texts(language)("error.unauthorised"))
 
 
 def create_api(bench: Bench | None, scene: HubScene | None = None, language: str = "en") -> FastAPI:

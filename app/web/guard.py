@@ -3,22 +3,27 @@
 1. Host is a loopback name with our very port: no foreign name may be pointed at us (DNS rebinding).
 2. Origin, where present, is ours; a WebSocket must have one, for the browser's same-origin rule does not cover it.
 3. A request that another site's page makes (Sec-Fetch-Site) is refused, but for opening the page itself.
-4. A session by cookie; ``/?token=...`` opens one and is the only thing that works without.
+4. A session by cookie. While there are no users, ``/?token=...`` opens one and is the only thing that works without;
+   from the first user on it is a login: the page's own files, its texts and ``POST /api/login`` work without.
 5. A body is JSON and says so: a form or text/plain needs no preflight, so a foreign page could send it.
 6. A body is small: a larger one is refused unread, or as soon as it turns out to be larger than it said.
+7. A socket lives no longer than its session.
 """
 
 from __future__ import annotations
 
+import asyncio
+import contextlib
 from collections import deque
-from collections.abc import Awaitable, Callable, MutableMapping
+from collections.abc import Awaitable, Callable, Iterable, MutableMapping
+from dataclasses import dataclass
 from html import escape
 from typing import Any, Final
 from urllib.parse import parse_qs
 
-from app.errors import HubsideError
-from app.model.roles import SignedIn
-from app.web.access import SESSION_S, Access
+from app.errors import HubsideError, LoginNeededError
+from app.service.sessions import Session
+from app.web.access import Access
 from app.web.problem import (
     MEDIA_TYPE,
     ForbiddenHostError,
@@ -37,8 +42,14 @@ Headers = list[tuple[bytes, bytes]]
 
 SIGNED_IN: Final = "hubside.signed_in"
 """Key of the scope under which an application finds who asks (``SignedIn``)."""
+SESSION: Final = "hubside.session"
+"""Key of the scope under which an application finds the session of who asks (``Session``)."""
 LOOPBACK_NAMES: Final = ("127.0.0.1", "localhost", "[::1]")
 VISER_PATH: Final = "/viser"
+LOGIN_PATH: Final = "/api/login"
+TEXTS_PATH: Final = "/api/texts/"
+SIGNED_OUT: Final = 4401
+"""Code with which a socket is closed whose session has ended (4000 to 4999 are for applications, RFC 6455, 7.4.2)."""
 MAX_BODY: Final = 65_536
 """Of a request, in bytes: the longest list of addresses and the longest value fit."""
 _WITH_BODY: Final = ("POST", "PUT", "PATCH")
@@ -46,20 +57,35 @@ _FOREIGN: Final = ("cross-site", "same-site")
 _COMMON: Final = "default-src 'self'; base-uri 'none'; form-action 'none'; object-src 'none'"
 
 
+@dataclass(frozen=True, slots=True)
+class Reach:
+    """Under which names the server is reached, each with its port, and whether by TLS."""
+
+    hosts: frozenset[str]
+    secure: bool = False
+
+    @classmethod
+    def of(cls, names: Iterable[str], port: int, secure: bool) -> Reach:
+        """``names`` on ``port``. Browsers leave the usual port of a scheme away."""
+        hosts = {f"{name}:{port}" for name in names}
+        if port == (443 if secure else 80):
+            hosts |= set(names)
+        return cls(frozenset(hosts), secure)
+
+    @property
+    def scheme(self) -> str:
+        """Of the page."""
+        return "https" if self.secure else "http"
+
+
 class Guard:
-    """Wraps ``app``. ``port`` is ours; ``sign_in_text`` is told to a person who comes without a session.
+    """Wraps ``app``. ``sign_in_text`` is told to a person who comes without a session where only a token opens one."""
 
-    ``person`` is who a launch token lets in.
-    """
-
-    def __init__(self, app: App, access: Access, port: int, sign_in_text: str, person: SignedIn) -> None:
+    def __init__(self, app: App, access: Access, reach: Reach, sign_in_text: str) -> None:
         self._app = app
         self._access = access
-        self._hosts = frozenset(f"{name}:{port}" for name in LOOPBACK_NAMES)
+        self._reach = reach
         self._sign_in_text = sign_in_text
-        self._person = person
-        # Cookies are shared by all ports of a host: a second bench on another port must not end our session.
-        self._cookie = f"hubside_{port}"
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """ASGI."""
@@ -68,13 +94,19 @@ class Guard:
             return
         headers = _headers(scope)
         refusal = self._refusal(scope, headers)
+        session = None if refusal is not None else self._access.find(headers.get("cookie", ""))
         if refusal is not None:
             await _refuse(scope, headers, send, refusal)
-        elif self._has_session(headers):
-            scope[SIGNED_IN] = self._person
-            await self._pass(scope, receive, send, headers)
-        elif session := self._new_session(scope):
-            await _redirect(send, self._set_cookie(session))
+        elif session is not None:
+            scope[SESSION], scope[SIGNED_IN] = session, self._access.who(session)
+            await self._pass_session(session, scope, receive, send, headers)
+        elif self._access.sessions.login_needed:
+            if _is_open(scope):
+                await self._pass(scope, receive, send, headers)
+            else:
+                await _refuse(scope, headers, send, LoginNeededError())
+        elif secret := await self._launched(scope):
+            await _redirect(send, self._access.cookie(secret))
         else:
             await _refuse(scope, headers, send, UnauthorisedError(), self._sign_in_text)
 
@@ -83,10 +115,10 @@ class Guard:
     def _refusal(self, scope: Scope, headers: dict[str, str]) -> HubsideError | None:
         """What is wrong with the request itself, whoever sent it."""
         host, origin = headers.get("host", ""), headers.get("origin")
-        if host not in self._hosts:
+        if host not in self._reach.hosts:
             return ForbiddenHostError(host=host, origin=origin)
         socket = scope["type"] == "websocket"
-        if (origin is None and socket) or (origin is not None and origin != f"http://{host}"):
+        if (origin is None and socket) or (origin is not None and origin != f"{self._reach.scheme}://{host}"):
             return ForbiddenHostError(host=host, origin=origin)
         method = scope.get("method", "GET")
         opens_page = not socket and method == "GET" and headers.get("sec-fetch-dest") == "document"
@@ -99,27 +131,29 @@ class Guard:
             return _too_large()
         return None
 
-    def _has_session(self, headers: dict[str, str]) -> bool:
-        for part in headers.get("cookie", "").split(";"):
-            name, _, secret = part.strip().partition("=")
-            if name == self._cookie and self._access.holds(secret):
-                return True
-        return False
-
-    def _new_session(self, scope: Scope) -> str | None:
+    async def _launched(self, scope: Scope) -> str | None:
         token = _token(scope)
-        return None if token is None else self._access.open_session(token)
-
-    def _set_cookie(self, session: str) -> str:
-        return f"{self._cookie}={session}; Path=/; Max-Age={SESSION_S}; HttpOnly; SameSite=Strict"
+        return None if token is None else await self._access.sessions.launch(token)
 
     # -- passing -----------------------------------------------------------------
 
+    async def _pass_session(
+        self, session: Session, scope: Scope, receive: Receive, send: Send, headers: dict[str, str]
+    ) -> None:
+        if scope["type"] != "websocket":
+            await self._pass(scope, receive, send, headers)
+            return
+        leash = Leash(session, self._access.sessions.left_s(session), receive, send)
+        try:
+            await self._pass(scope, leash.receive, leash.send, headers)
+        finally:
+            leash.end()
+
     async def _pass(self, scope: Scope, receive: Receive, send: Send, headers: dict[str, str]) -> None:
         if _token(scope) is not None:
-            await _redirect(send)  # opened again with a session: the token must leave the address bar
+            await _redirect(send)  # opened again, or where it opens nothing any more: it must leave the address bar
             return
-        extra = security_headers(str(scope["path"]), headers["host"])
+        extra = security_headers(str(scope["path"]), headers["host"], self._reach.secure)
 
         async def secured(message: Message) -> None:
             if message["type"] == "http.response.start":
@@ -136,6 +170,62 @@ class Guard:
             await _refuse(scope, headers, send, _too_large())
         else:
             await self._app(scope, _given(body, receive), secured)
+
+
+class Leash:
+    """Closes a socket when its session ends, or after ``left_s`` seconds. For one use of ``receive`` at a time."""
+
+    def __init__(self, session: Session, left_s: float, receive: Receive, send: Send) -> None:
+        self._receive = receive
+        self._send = send
+        self._coming: asyncio.Task[Message] | None = None
+        self._closed = False
+        self._ended = asyncio.create_task(_ended(session, left_s))
+
+    async def receive(self) -> Message:
+        """The next message of the client; that it went away, where its session ended."""
+        if self._coming is None:
+            self._coming = asyncio.create_task(_next(self._receive))
+        await asyncio.wait({self._coming, self._ended}, return_when=asyncio.FIRST_COMPLETED)
+        if self._ended.done():
+            if not self._closed:
+                self._closed = True
+                await self._send({"type": "websocket.close", "code": SIGNED_OUT, "reason": "signed out"})
+            return {"type": "websocket.disconnect", "code": SIGNED_OUT}
+        coming, self._coming = self._coming, None
+        return coming.result()
+
+    async def send(self, message: Message) -> None:
+        """To the client, unless the socket was closed for it."""
+        if not self._closed and not self._ended.done():
+            await self._send(message)
+
+    def end(self) -> None:
+        """The application is done."""
+        self._ended.cancel()
+        if self._coming is not None:
+            self._coming.cancel()
+
+
+async def _ended(session: Session, left_s: float) -> None:
+    with contextlib.suppress(TimeoutError):
+        async with asyncio.timeout(left_s):
+            await session.ended.wait()
+
+
+async def _next(receive: Receive) -> Message:
+    return await receive()
+
+
+def _is_open(scope: Scope) -> bool:
+    """True for what a login page needs before anybody has logged in."""
+    if scope["type"] != "http":
+        return False
+    path, method = str(scope["path"]), scope["method"]
+    if path == LOGIN_PATH:
+        return bool(method == "POST")
+    served = path.startswith(TEXTS_PATH) or not path.startswith(("/api", VISER_PATH))
+    return served and method in ("GET", "HEAD")
 
 
 async def _body(receive: Receive) -> list[Message] | None:
@@ -166,13 +256,13 @@ def _too_large() -> TooLargeError:
     return TooLargeError(reason=f"the body is larger than {MAX_BODY} bytes")
 
 
-def security_headers(path: str, host: str) -> Headers:
+def security_headers(path: str, host: str, secure: bool = False) -> Headers:
     """The headers of every answer under ``path``. The 3D client is one page of inline code, so it has rules of its own.
 
     ``host`` is named because not every browser counts ws: to 'self'.
     """
     scene = path == VISER_PATH or path.startswith(f"{VISER_PATH}/")
-    connect = f"connect-src 'self' ws://{host}"
+    connect = f"connect-src 'self' {'wss' if secure else 'ws'}://{host}"
     if scene:
         # Its WebAssembly decoder and its worker are inline too; the worker inherits these rules.
         policy = (

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import json
-import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
@@ -25,6 +24,7 @@ from app.service.bench import Bench
 from app.service.connection import Connection
 from app.service.options import Options
 from app.service.sites import Sites
+from app.store.store import Store
 from app.web.access import Access
 from app.web.app import create_app
 from app.web.serve import launch_url, open_port, port_of, serve
@@ -42,10 +42,11 @@ def make_connection() -> Connection:
     return Connection(turbine, _descriptions(), Options(person="tester", recordings=None))
 
 
-def bench_with(connection: Connection) -> Bench:
+def bench_with(connection: Connection, store: Store | None = None) -> Bench:
     """A bench that serves ``connection``."""
-    bench = Bench(Sites((connection.turbine,), lambda _turbine: _descriptions()), Options("tester", None))
-    bench.stamper, bench.journal = connection.stamper, connection.journal
+    sites = Sites((connection.turbine,), lambda _turbine: _descriptions())
+    options = Options("tester", None)
+    bench = Bench(sites, options, store=store, stamper=connection.stamper, journal=connection.journal)
     bench.show(connection)
     return bench
 
@@ -124,13 +125,14 @@ async def running(
     scene: HubScene | None = None,
     page: Path | None = None,
     signed_in: bool = True,
+    store: Store | None = None,
 ) -> AsyncIterator[Server]:
     """Start a server; stop it at the end."""
     connection = connection or make_connection()
-    bench = bench_with(connection)
+    bench = bench_with(connection, store)
     listener = open_port(0)
     port = port_of(listener)
-    access = Access(time.monotonic)
+    access = Access(bench.office.sessions, port)
     token = access.issue_token()
     async with serve(create_app(bench, access, port, scene, "en", page), listener):
         base = f"http://127.0.0.1:{port}"
@@ -141,7 +143,10 @@ async def running(
             if signed_in:
                 answer = await client.get(launch_url(port, token))
                 assert answer.status_code == 303
-            yield Server(port, token, access, bench, connection, Feeder(connection), client, stranger)
+            try:
+                yield Server(port, token, access, bench, connection, Feeder(connection), client, stranger)
+            finally:
+                await bench.office.close()
 
 
 async def denied(opening: connect) -> int:

@@ -8,7 +8,6 @@ from collections.abc import AsyncIterator
 import httpx
 import pytest
 
-from app.web.access import SESSION_S, Access
 from app.web.guard import MAX_BODY
 from app.web.serve import launch_url
 from tests.web.rig import DEADLINE_S, Server, denied, running
@@ -210,15 +209,3 @@ async def test_unknown_paths_are_problems(server: Server) -> None:
     answer = await server.client.get("/api/nothing")
     assert answer.status_code == 404
     assert answer.json()["code"] == "not_found"
-
-
-def test_sessions_end() -> None:
-    clock = [0.0]
-    access = Access(lambda: clock[0])
-    session = access.open_session(access.issue_token())
-    assert session is not None
-    clock[0] = SESSION_S - 1
-    assert access.holds(session)
-    clock[0] = SESSION_S + 1
-    assert not access.holds(session)
-    assert access.open_session("guess") is None

@@ -27,12 +27,16 @@ class Problem(BaseModel):
 
 
 class Session(BaseModel):
-    """Who is served, and in which languages. ``user`` is null where a launch token opened the session."""
+    """Who is served, and in which languages. ``user`` is null where a launch token opened the session.
+
+    ``login_needed``: users exist, so nobody gets in without a login.
+    """
 
     version: str
     role: RoleName
     person: str
     user: str | None
+    login_needed: bool
     languages: list[Language]
     locale: Language
 

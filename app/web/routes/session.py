@@ -6,20 +6,21 @@ from fastapi import APIRouter, Request
 
 from app import __version__
 from app.model.texts import LANGUAGES, load_texts
-from app.web.deps import PersonOf
+from app.web.deps import BenchOf, PersonOf
 from app.web.models import Language, Session
 
 router = APIRouter()
 
 
 @router.get("/session")
-async def session(request: Request, person: PersonOf) -> Session:
+async def session(request: Request, bench: BenchOf, person: PersonOf) -> Session:
     """Who is served, and in which languages."""
     return Session(
         version=__version__,
         role=person.role.value,
         person=person.person,
         user=person.user_id,
+        login_needed=bench.office.sessions.login_needed,
         languages=list(LANGUAGES),
         locale=request.app.state.language,
     )

@@ -84,6 +84,106 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/live/bus/emergencies": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Bus Emergencies
+         * @description Emergency messages, newest first.
+         */
+        get: operations["bus_emergencies"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/live/bus/identifiers": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Bus Identifiers
+         * @description All CAN identifiers that were seen: latest data, count, rate, period, share of the load.
+         */
+        get: operations["bus_identifiers"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/live/bus/load": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Bus Load
+         * @description Load of each bus now and second by second, with the share of each node.
+         */
+        get: operations["bus_load"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/live/bus/nodes": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Bus Nodes
+         * @description All nodes that were seen on the buses, and those that the site names.
+         */
+        get: operations["bus_nodes"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/live/bus/transfers": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Bus Transfers
+         * @description SDO transfers, newest first: all, only writes and what did not succeed, or only what did not succeed.
+         */
+        get: operations["bus_transfers"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/live/connect": {
         parameters: {
             query?: never;
@@ -258,6 +358,26 @@ export interface paths {
          * @description FEATHER to every axis. This is no safety function.
          */
         post: operations["feather"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/live/frames": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Frames
+         * @description Decoded frames before, after or around a moment: from memory, and what is older from the running recording.
+         */
+        get: operations["frames"];
+        put?: never;
+        post?: never;
         delete?: never;
         options?: never;
         head?: never;
@@ -1178,6 +1298,116 @@ export interface components {
             name: string;
         };
         /**
+         * BusIdentifier
+         * @description One identifier: what it carried last, how often it comes, and its share of the bus (0..1 of the bit rate).
+         */
+        BusIdentifier: {
+            /** Bus */
+            bus: string;
+            /** Can Id */
+            can_id: number;
+            /** Data */
+            data: string;
+            /** Device */
+            device: string | null;
+            /**
+             * Direction
+             * @enum {string}
+             */
+            direction: "rx" | "tx";
+            /** Dlc */
+            dlc: number;
+            /** Extended */
+            extended: boolean;
+            /** Frames */
+            frames: number;
+            /** Load */
+            load: number;
+            /** Longest Ms */
+            longest_ms: number | null;
+            /** Node */
+            node: number;
+            /** Number */
+            number: number;
+            /** Per Second */
+            per_second: number;
+            /** Period Ms */
+            period_ms: number | null;
+            /** Remote */
+            remote: boolean;
+            /** Service */
+            service: string;
+            /** Shortest Ms */
+            shortest_ms: number | null;
+            /** T Ns */
+            t_ns: number;
+        };
+        /**
+         * BusLoadLine
+         * @description The load of one bus: now, by node now, and second by second, oldest first.
+         */
+        BusLoadLine: {
+            /** Bitrate */
+            bitrate: number;
+            /** Bus */
+            bus: string;
+            /** Load */
+            load: number;
+            /** Nodes */
+            nodes: {
+                [key: string]: number;
+            };
+            /** Seconds */
+            seconds: components["schemas"]["LoadSecondLine"][];
+        };
+        /**
+         * BusNode
+         * @description One node that was seen, or that the site names. ``nmt`` is the text key of its state.
+         *
+         *     ``device_name`` is what it said of itself (1008h). ``sdo_per_node`` counts transfers; ``other_client_t_ns`` is the
+         *     latest one that was not ours.
+         */
+        BusNode: {
+            /** Boots */
+            boots: number;
+            /** Bus */
+            bus: string;
+            /** Commanded */
+            commanded: boolean;
+            /** Description */
+            description: string | null;
+            /** Device */
+            device: string | null;
+            /** Device Name */
+            device_name: string | null;
+            /** Emcy */
+            emcy: {
+                [key: string]: unknown;
+            } | null;
+            /** Emcy T Ns */
+            emcy_t_ns: number | null;
+            /** Heartbeat T Ns */
+            heartbeat_t_ns: number | null;
+            /** Load */
+            load: number;
+            /** Nmt */
+            nmt: string | null;
+            /** Node */
+            node: number;
+            /** Other Client T Ns */
+            other_client_t_ns: number | null;
+            /** Period Ms */
+            period_ms: number | null;
+            /** Sdo Count */
+            sdo_count: number;
+            /** Sdo T Ns */
+            sdo_t_ns: number | null;
+            /** Seen */
+            seen: boolean;
+            /** Silent */
+            silent: boolean;
+        };
+        /**
          * BusRef
          * @description The bus; ``interface`` is the adapter as it was named.
          */
@@ -1191,11 +1421,13 @@ export interface components {
         };
         /**
          * Subscribe
-         * @description What the page wants to hear; replaces what it wanted before.
+         * @description What the page wants to hear; replaces what it wanted before. ``trace`` is the filter of the topic ``trace``.
          */
         ClientMessage: {
             /** Topics */
             topics: string[];
+            /** @default null */
+            trace: components["schemas"]["TraceFilter"] | null;
             /**
              * Type
              * @constant
@@ -1247,6 +1479,26 @@ export interface components {
             node: number;
             /** Slug */
             slug: string;
+        };
+        /**
+         * EmcyLine
+         * @description One emergency message; ``reset``: it tells that an error is gone.
+         */
+        EmcyLine: {
+            /** Bus */
+            bus: string;
+            /** Details */
+            details: {
+                [key: string]: unknown;
+            };
+            /** Device */
+            device: string | null;
+            /** Node */
+            node: number;
+            /** Reset */
+            reset: boolean;
+            /** T Ns */
+            t_ns: number;
         };
         /**
          * EventLine
@@ -1599,6 +1851,22 @@ export interface components {
              * @constant
              */
             v: 1;
+        };
+        /**
+         * LoadSecondLine
+         * @description One full second: load 0..1, frames, and the load by node (0: of no node).
+         */
+        LoadSecondLine: {
+            /** Frames */
+            frames: number;
+            /** Load */
+            load: number;
+            /** Nodes */
+            nodes: {
+                [key: string]: number;
+            };
+            /** Second */
+            second: number;
         };
         /**
          * LoginDone
@@ -2106,6 +2374,42 @@ export interface components {
             consent: boolean;
         };
         /**
+         * SdoLine
+         * @description One SDO transfer. ``ours``: the bench was its client. ``abort`` fills a text, as in the trace.
+         */
+        SdoLine: {
+            /** Abort */
+            abort: {
+                [key: string]: unknown;
+            } | null;
+            /** Aborted By */
+            aborted_by: string | null;
+            /**
+             * Access
+             * @enum {string}
+             */
+            access: "read" | "write";
+            /** Bus */
+            bus: string;
+            /** Device */
+            device: string | null;
+            item: components["schemas"]["TraceItem"];
+            /** Node */
+            node: number;
+            /** Ours */
+            ours: boolean;
+            /** Outcome */
+            outcome: string;
+            /** Protocol */
+            protocol: string;
+            /** Start T Ns */
+            start_t_ns: number;
+            /** T Ns */
+            t_ns: number;
+            /** Took Ms */
+            took_ms: number;
+        };
+        /**
          * SearchDoc
          * @description A search for the bit rate so far.
          */
@@ -2132,7 +2436,7 @@ export interface components {
             /** Connection */
             connection: string;
         };
-        ServerMessage: components["schemas"]["HelloMessage"] | components["schemas"]["BenchMessage"] | components["schemas"]["HeartbeatMessage"] | components["schemas"]["LinkMessage"] | components["schemas"]["NodesMessage"] | components["schemas"]["AxesMessage"] | components["schemas"]["ValuesMessage"] | components["schemas"]["EventMessage"];
+        ServerMessage: components["schemas"]["HelloMessage"] | components["schemas"]["BenchMessage"] | components["schemas"]["HeartbeatMessage"] | components["schemas"]["LinkMessage"] | components["schemas"]["NodesMessage"] | components["schemas"]["AxesMessage"] | components["schemas"]["ValuesMessage"] | components["schemas"]["EventMessage"] | components["schemas"]["TraceMessage"];
         /**
          * Session
          * @description Who is served, and in which languages. ``user`` is null where a launch token opened the session.
@@ -2438,6 +2742,227 @@ export interface components {
              * @default false
              */
             sure: boolean;
+        };
+        /**
+         * TraceBatch
+         * @description New rows, oldest first, and what became of the frames since ``start_t_ns``.
+         *
+         *     ``seen`` counts all frames, ``matched`` those that the filter lets pass, ``sent`` those that were sent; ``left_out``
+         *     were matched and are not sent: the recording has them. The rest waits for the next batch. ``invalid`` says what is
+         *     wrong with the filter; then nothing is sent.
+         */
+        TraceBatch: {
+            /** Id */
+            id: number;
+            /** Invalid */
+            invalid: string | null;
+            /** Left Out */
+            left_out: number;
+            /** Matched */
+            matched: number;
+            /** Rows */
+            rows: components["schemas"]["TraceLine"][];
+            /** Seen */
+            seen: number;
+            /** Sent */
+            sent: number;
+            /** Start T Ns */
+            start_t_ns: number;
+        };
+        /**
+         * TraceFilter
+         * @description Empty means any; all that is given must hold. ``id`` comes back with each answer.
+         *
+         *     ``ids``: identifiers and ranges in hexadecimal (``18B, 580-5FF``); ``data``: a pattern of bytes (``4? ?? 60``,
+         *     ``* 64 60``); ``q``: part of an object's name or address, or of what a row says, in any language.
+         */
+        TraceFilter: {
+            /**
+             * Buses
+             * @default []
+             */
+            buses: string[];
+            /**
+             * Data
+             * @default
+             */
+            data: string;
+            /**
+             * Direction
+             * @default null
+             */
+            direction: ("rx" | "tx") | null;
+            /**
+             * Errors
+             * @default false
+             */
+            errors: boolean;
+            /**
+             * From T Ns
+             * @default null
+             */
+            from_t_ns: number | null;
+            /**
+             * Id
+             * @default 0
+             */
+            id: number;
+            /**
+             * Ids
+             * @default
+             */
+            ids: string;
+            /**
+             * Nodes
+             * @default []
+             */
+            nodes: number[];
+            /**
+             * Q
+             * @default
+             */
+            q: string;
+            /**
+             * Services
+             * @default []
+             */
+            services: string[];
+            /**
+             * To T Ns
+             * @default null
+             */
+            to_t_ns: number | null;
+        };
+        /**
+         * TraceItem
+         * @description One object with the value that a frame brought; ``text`` is None where it names the object only.
+         *
+         *     ``key`` is the text key of an enumeration's value; ``bits`` are those of the bits that are set.
+         */
+        TraceItem: {
+            /** Address */
+            address: string;
+            /** Bits */
+            bits: string[];
+            /** Key */
+            key: string | null;
+            /** Name */
+            name: string | null;
+            /** Text */
+            text: string | null;
+            /** Unit */
+            unit: string;
+        };
+        /**
+         * TraceLine
+         * @description One frame, or a gap in the traffic. ``start_t_ns``: the first request of the transfer that this frame ended.
+         */
+        TraceLine: {
+            /** Bus */
+            bus: string;
+            /** Can Id */
+            can_id: number;
+            /** Data */
+            data: string;
+            /** Device */
+            device: string | null;
+            /**
+             * Direction
+             * @enum {string}
+             */
+            direction: "rx" | "tx";
+            /** Dlc */
+            dlc: number;
+            /** Extended */
+            extended: boolean;
+            /** Items */
+            items: components["schemas"]["TraceItem"][];
+            /** Node */
+            node: number;
+            /** Notes */
+            notes: components["schemas"]["TraceNote"][];
+            /** Number */
+            number: number;
+            /** Remote */
+            remote: boolean;
+            /** Service */
+            service: string;
+            /** Start T Ns */
+            start_t_ns: number | null;
+            /** Step */
+            step: string | null;
+            /** T Adapter Ns */
+            t_adapter_ns: number | null;
+            /** T Ns */
+            t_ns: number;
+            /**
+             * Tone
+             * @enum {string}
+             */
+            tone: "plain" | "warning" | "error";
+        };
+        /**
+         * TraceMessage
+         * @description Topic ``trace``: ten times a second while it is subscribed, with as many rows as a page can show.
+         */
+        TraceMessage: {
+            /**
+             * Ctx
+             * @default live
+             * @constant
+             */
+            ctx: "live";
+            data: components["schemas"]["TraceBatch"];
+            /** Seq */
+            seq: number;
+            /** T Ns */
+            t_ns: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            type: "trace";
+            /**
+             * V
+             * @default 1
+             * @constant
+             */
+            v: 1;
+        };
+        /**
+         * TraceNote
+         * @description A text key with what fills its placeholders; a detail named ``x_key`` is itself a text key.
+         */
+        TraceNote: {
+            /** Details */
+            details: {
+                [key: string]: unknown;
+            };
+            /** Key */
+            key: string;
+        };
+        /**
+         * TracePage
+         * @description Rows, oldest first. Looked at was everything between ``from_t_ns`` and ``to_t_ns`` (None: no end).
+         *
+         *     ``older`` and ``newer``: there may be more beyond.
+         */
+        TracePage: {
+            /** From T Ns */
+            from_t_ns: number | null;
+            /** Newer */
+            newer: boolean;
+            /** Older */
+            older: boolean;
+            /** Rows */
+            rows: components["schemas"]["TraceLine"][];
+            /**
+             * Source
+             * @enum {string}
+             */
+            source: "ring" | "recording";
+            /** To T Ns */
+            to_t_ns: number | null;
         };
         /**
          * Turbine
@@ -2764,6 +3289,162 @@ export interface operations {
             };
         };
     };
+    bus_emergencies: {
+        parameters: {
+            query?: {
+                limit?: number;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["EmcyLine"][];
+                };
+            };
+            /** @description What went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                    "application/problem+json": unknown;
+                };
+            };
+        };
+    };
+    bus_identifiers: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["BusIdentifier"][];
+                };
+            };
+            /** @description What went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                    "application/problem+json": unknown;
+                };
+            };
+        };
+    };
+    bus_load: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["BusLoadLine"][];
+                };
+            };
+            /** @description What went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                    "application/problem+json": unknown;
+                };
+            };
+        };
+    };
+    bus_nodes: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["BusNode"][];
+                };
+            };
+            /** @description What went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                    "application/problem+json": unknown;
+                };
+            };
+        };
+    };
+    bus_transfers: {
+        parameters: {
+            query?: {
+                which?: "all" | "writes" | "failed";
+                node?: number | null;
+                limit?: number;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SdoLine"][];
+                };
+            };
+            /** @description What went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                    "application/problem+json": unknown;
+                };
+            };
+        };
+    };
     connect: {
         parameters: {
             query?: never;
@@ -3072,6 +3753,58 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["StopDone"];
+                };
+            };
+            /** @description What went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                    "application/problem+json": unknown;
+                };
+            };
+        };
+    };
+    frames: {
+        parameters: {
+            query?: {
+                /** @description A time stamp in ns; exactly one of the three */
+                before?: number | null;
+                /** @description A time stamp in ns; exactly one of the three */
+                after?: number | null;
+                /** @description A time stamp in ns; exactly one of the three */
+                around?: number | null;
+                limit?: number;
+                /** @description Node numbers, separated by commas */
+                nodes?: string;
+                /** @description Services, separated by commas */
+                services?: string;
+                buses?: string;
+                direction?: ("rx" | "tx") | null;
+                ids?: string;
+                data?: string;
+                q?: string;
+                errors?: boolean;
+                /** @description A time stamp in ns; exactly one of the three */
+                from_t_ns?: number | null;
+                /** @description A time stamp in ns; exactly one of the three */
+                to_t_ns?: number | null;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["TracePage"];
                 };
             };
             /** @description What went wrong */

@@ -1,0 +1,31 @@
+"""The office of a bench: what is kept of people and their work, in one store."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from app.service.audit import AuditLog
+from app.service.journal import Journal
+from app.service.sessions import Sessions
+from app.service.users import Users
+from app.store.store import Store
+
+
+class Office:
+    """Audit log, users and sessions of ``store``. ``stamp`` gives t_ns; every event of ``journal`` is audited.
+
+    ``person`` is who a launch token lets in. Raises StoreError. Belongs to the event loop, and owns the store.
+    """
+
+    def __init__(self, store: Store, journal: Journal, stamp: Callable[[], int], person: str) -> None:
+        self.store = store
+        self.audit = AuditLog(store, stamp, journal)
+        self.users = Users(store, self.audit)
+        self.sessions = Sessions(store, self.users, self.audit, person)
+        self._stop_listening = journal.listen(self.audit.take)
+
+    async def close(self) -> None:
+        """Have everything on the disk, and let another process have the store."""
+        self._stop_listening()
+        await self.audit.close()
+        self.store.close()

@@ -1,0 +1,55 @@
+"""The versions of the store's schema, each as the statements that lead to it from the one before.
+
+A step that was released is never changed: files made by it are out there. ``user_version`` of the file tells how far
+it is. Each step is one transaction with its version number, so that a crash leaves the version before.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+STEPS: Final[tuple[tuple[str, ...], ...]] = (
+    (
+        """CREATE TABLE users (
+            id TEXT PRIMARY KEY NOT NULL, name TEXT NOT NULL, name_key TEXT NOT NULL UNIQUE, role TEXT NOT NULL,
+            password_hash TEXT NOT NULL, disabled INTEGER NOT NULL, created_ns INTEGER NOT NULL
+        ) STRICT""",
+        """CREATE TABLE sessions (
+            id TEXT PRIMARY KEY NOT NULL, secret_hash TEXT NOT NULL UNIQUE, user_id TEXT REFERENCES users (id),
+            created_ns INTEGER NOT NULL, expires_ns INTEGER NOT NULL
+        ) STRICT""",
+        """CREATE TABLE audit (
+            seq INTEGER PRIMARY KEY NOT NULL, id TEXT NOT NULL UNIQUE, t_ns INTEGER NOT NULL, person TEXT NOT NULL,
+            kind TEXT NOT NULL, device TEXT, address TEXT, details TEXT NOT NULL, previous TEXT NOT NULL,
+            hash TEXT NOT NULL
+        ) STRICT""",
+        "CREATE INDEX audit_device ON audit (device, address, seq)",
+        "CREATE INDEX audit_kind ON audit (kind, seq)",
+        "CREATE INDEX audit_person ON audit (person, seq)",
+        "CREATE TABLE audit_head (one INTEGER PRIMARY KEY NOT NULL, seq INTEGER NOT NULL, hash TEXT NOT NULL) STRICT",
+        """CREATE TRIGGER audit_keeps_its_rows BEFORE DELETE ON audit
+            BEGIN SELECT RAISE(ABORT, 'rows of the audit log are never deleted'); END""",
+        """CREATE TRIGGER audit_never_changes BEFORE UPDATE ON audit
+            BEGIN SELECT RAISE(ABORT, 'rows of the audit log are never changed'); END""",
+        "CREATE TABLE settings (key TEXT PRIMARY KEY NOT NULL, value TEXT NOT NULL) STRICT",
+    ),
+    (
+        """CREATE TABLE visits (
+            id TEXT PRIMARY KEY NOT NULL, turbine TEXT NOT NULL, person TEXT NOT NULL, started_ns INTEGER NOT NULL,
+            ended_ns INTEGER, left_open INTEGER NOT NULL, reason TEXT NOT NULL, work_order TEXT NOT NULL
+        ) STRICT""",
+        "CREATE INDEX visits_turbine ON visits (turbine, started_ns)",
+        """CREATE TABLE visit_sets (
+            visit_id TEXT NOT NULL REFERENCES visits (id), phase TEXT NOT NULL, device TEXT NOT NULL,
+            content TEXT NOT NULL, PRIMARY KEY (visit_id, phase, device)
+        ) STRICT""",
+    ),
+    (
+        """CREATE TABLE favourites (
+            person TEXT NOT NULL, description_id TEXT NOT NULL, address TEXT NOT NULL, position INTEGER NOT NULL,
+            PRIMARY KEY (person, description_id, address)
+        ) STRICT""",
+    ),
+)
+SCHEMA: Final = len(STEPS)
+"""The version that this program writes."""
