@@ -13,7 +13,8 @@ from app.model.address import Address
 from app.model.description import Bus, Description
 from app.model.site import BusConfig
 from app.service.options import Options
-from app.wire.busload import BusLoad
+from app.service.trace_log import BusTrace
+from app.wire.busload import EXTENDED_KEY, BusLoad, LoadSecond
 from app.wire.can_bits import frame_bits
 from app.wire.decoder import CanOpenDecoder
 from app.wire.frame import Can, Frame, Stamper
@@ -56,6 +57,7 @@ class BusLink:
         self.adapter = config.connection
         self.decoder = CanOpenDecoder(config.name, descriptions)
         self.load = BusLoad(self.bitrate)
+        self.trace = BusTrace(config.name, self.decoder, lock)
         self.frames = 0
         self.sink: FrameSink | None = None
         self._live = live
@@ -77,6 +79,7 @@ class BusLink:
         """Tell decoder, live state and driver what stands at ``node``."""
         with self._lock:
             self.decoder.set_description(node, description)
+            self.trace.describe(node, description)
             self._live.set_description(self.name, node, description)
         self.driver.set_description(node, description)
 
@@ -90,19 +93,42 @@ class BusLink:
             for t_ns, _, _, can, _ in frames:
                 if type(can) is Can:
                     count(t_ns, frame_bits(can), can.can_id, can.extended)
+            self.trace.take(frames)
             records = self.decoder.feed_all(frames)
             if records:
+                self.trace.heard(records)
                 self._live.apply_all(records)
 
     def gap(self, t_ns: int) -> None:
         """Frames are missing before ``t_ns``: what was read until then proves nothing any more."""
         with self._lock:
-            self._live.apply_all(self.decoder.gap(t_ns, GAP_REASON))
+            self.trace.gap(t_ns, GAP_REASON)
+            records = self.decoder.gap(t_ns, GAP_REASON)
+            self.trace.heard(records)
+            self._live.apply_all(records)
 
     def bus_load(self, now_ns: int) -> float:
         """Load of the last second, 0..1."""
         with self._lock:
             return self.load.load(now_ns)
+
+    def node_load(self, now_ns: int) -> dict[int, float]:
+        """Load of the last second by node; 0 is what belongs to none."""
+        with self._lock:
+            return self.load.shares_by(self._node_of, now_ns)
+
+    def identifier_load(self, now_ns: int) -> dict[int, float]:
+        """Load of the last second by identifier; 29-bit identifiers have 2^29 added."""
+        with self._lock:
+            return self.load.shares(now_ns)
+
+    def load_history(self, seconds: int) -> tuple[list[LoadSecond], list[tuple[int, dict[int, float]]]]:
+        """The last full seconds, oldest first: the load, and the load by node."""
+        with self._lock:
+            return list(self.load.history)[-seconds:], self.load.history_by(self._node_of)[-seconds:]
+
+    def _node_of(self, key: int) -> int:
+        return self.decoder.speaker(key & ~EXTENDED_KEY, bool(key & EXTENDED_KEY)).node
 
     @property
     def status(self) -> DriverStatus:

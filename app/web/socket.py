@@ -22,6 +22,9 @@ from app.service.connection import Connection
 from app.service.devices import Target
 from app.service.journal import Entry
 from app.service.link import LinkLine, bench_line, link_urgent
+from app.service.trace_query import TraceQuery
+from app.service.trace_tail import PERIOD_S as TRACE_S
+from app.service.trace_tail import TraceTail
 from app.service.views import (
     AxisLine,
     EventLine,
@@ -45,6 +48,7 @@ from app.web.models import (
     LinkMessage,
     NodesMessage,
     ServerMessage,
+    TraceMessage,
     ValuesData,
     ValuesMessage,
 )
@@ -91,17 +95,22 @@ class Feed:
         self._nodes_changed = False
         self._told_events = False
         self._next: dict[str, float] = {}
+        self._trace_query = TraceQuery()
+        self._trace: TraceTail | None = None
 
     def close(self) -> None:
         """Forget the client."""
         self._stop_listening()
 
-    def subscribe(self, topics: list[str]) -> None:
+    def subscribe(self, topics: list[str], trace: TraceQuery | None = None) -> None:
         """Replace the topics. Each topic's snapshot comes again, past events only where they are a new topic.
 
         Topics that do not exist are passed over.
         """
         before, self._topics = self._topics, frozenset(topics)
+        wanted = trace or TraceQuery()
+        if "trace" not in self._topics or wanted != self._trace_query:
+            self._trace, self._trace_query = None, wanted
         self._start_over(before & {"events"})
 
     def _start_over(self, known: frozenset[str] = frozenset()) -> None:
@@ -131,6 +140,8 @@ class Feed:
         if "axes" in self._topics:
             yield from self._axes_due(now_s)
         yield from self._events_due(changes)
+        if "trace" in self._topics:
+            yield from self._trace_due(now_s)
         self._fresh.clear()
         if self._passed("heartbeat", now_s, HEARTBEAT_S):
             yield HeartbeatMessage(seq=self._count(), t_ns=self._bench.stamper())
@@ -143,6 +154,7 @@ class Feed:
         self._slugs = {(target.device.bus, target.node): slug for slug, target in self._targets.items()}
         self._cursor = self._since = 0
         self._link, self._axes, self._nodes_urgent = None, (), ()
+        self._trace = None
         self._start_over(frozenset({"events"} if self._told_events else ()))
         turbine = None if self._connection is None else self._connection.turbine.slug
         return BenchMessage(
@@ -220,6 +232,13 @@ class Feed:
         for line in sorted(lines, key=lambda line: line.t_ns)[-RECENT_EVENTS:]:
             yield EventMessage(seq=self._count(), t_ns=self._bench.stamper(), data=line)
 
+    def _trace_due(self, now_s: float) -> Iterator[ServerMessage]:
+        if self._connection is None or not self._passed("trace", now_s, TRACE_S):
+            return
+        if self._trace is None:
+            self._trace = TraceTail(self._connection, self._trace_query)
+        yield TraceMessage(seq=self._count(), t_ns=self._bench.stamper(), data=self._trace.batch())
+
     def _passed(self, what: str, now_s: float, period_s: float) -> bool:
         """True at most once a period."""
         if now_s < self._next.get(what, now_s):
@@ -287,4 +306,4 @@ async def _listen(socket: WebSocket, feed: Feed) -> None:
             log.warning("a page sent what is no message: %s", error.errors()[0]["msg"])
             await socket.close(1008, "no such message")
             return
-        feed.subscribe(request.topics)
+        feed.subscribe(request.topics, None if request.trace is None else request.trace.query())

@@ -38,6 +38,7 @@ from app.wire.records import (
     ValueSeen,
 )
 from app.wire.sdo_follower import SdoFollower
+from app.wire.trace_service import UNKNOWN, Service, Speaker, predefined
 
 ERROR_REGISTER: Final = Address(0x1001)
 _EXTENDED: Final = 1 << 29
@@ -82,6 +83,7 @@ class CanOpenDecoder:
             number: _Node(bus, number, (descriptions or {}).get(number)) for number in range(1, nmt.MAX_NODE + 1)
         }
         self._routes: dict[int, tuple[_Handler, Any]] = {}
+        self._speakers: dict[int, Speaker] = {}
         self._route()
 
     def set_description(self, node: int, description: Description | None) -> None:
@@ -123,6 +125,38 @@ class CanOpenDecoder:
         """The valid PDOs of ``node`` whose mapping is known, as in force now. Raises KeyError outside 1..127."""
         return self._nodes[node].layout.pdos
 
+    def sdo(self, node: int) -> SdoFollower:
+        """Who follows the transfers of ``node``. Raises KeyError outside 1..127."""
+        return self._nodes[node].sdo
+
+    def speaker(self, can_id: int, extended: bool = False) -> Speaker:
+        """Whose identifier this is by what is known now, else by the predefined connection set."""
+        if extended:
+            return self._who(can_id | _EXTENDED, can_id)
+        found = self._speakers.get(can_id)
+        if found is None:
+            found = self._speakers[can_id] = self._who(can_id, can_id)
+        return found
+
+    def _who(self, key: int, can_id: int) -> Speaker:
+        route = self._routes.get(key)
+        if route is None:
+            return UNKNOWN if key & _EXTENDED else predefined(can_id)
+        handler, target = route
+        if handler == self._on_pdo:
+            sender = next((one for one in target if not one.received), target[0])
+            service = Service.RPDO if sender.received else Service.TPDO
+            return Speaker(service, sender.node.number, sender.route.number)
+        service = {
+            self._on_sdo_request: Service.SDO_REQUEST,
+            self._on_sdo_response: Service.SDO_RESPONSE,
+            self._on_emcy: Service.EMCY,
+            self._on_heartbeat: Service.HEARTBEAT,
+            self._on_nmt: Service.NMT,
+            self._on_sync: Service.SYNC,
+        }[handler]
+        return Speaker(service, 0 if target is None else target.number)
+
     # -- routes ----------------------------------------------------------------
 
     def _refresh(self, node: _Node) -> None:
@@ -153,6 +187,7 @@ class CanOpenDecoder:
         routes[nmt.NMT_COB_ID] = (self._on_nmt, None)
         routes[sync.SYNC_COB_ID] = (self._on_sync, None)
         self._routes = routes
+        self._speakers.clear()
 
     # -- services --------------------------------------------------------------
 

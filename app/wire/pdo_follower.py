@@ -28,12 +28,13 @@ EMCY_COB_ID: Final = 0x1014
 
 
 class PdoRoute(NamedTuple):
-    """A PDO that exists: its identifier, what it carries, and which way."""
+    """A PDO that exists: its identifier, what it carries, which way, and its number from 1 on."""
 
     can_id: int
     extended: bool
     mapping: pdo.Mapping
     source: Source
+    number: int
 
 
 class Layout(NamedTuple):
@@ -125,7 +126,7 @@ class NodeConfiguration:
                     continue
                 parameters = pdo.PdoParameters(cob_id)
                 if parameters.valid:
-                    yield PdoRoute(parameters.can_id, parameters.extended, mapping, source)
+                    yield PdoRoute(parameters.can_id, parameters.extended, mapping, source, number + 1)
 
     def _numbers(self, base: int) -> list[int]:
         known = {a.major - base for known in (self._defaults, self._known) for a in known}

@@ -105,13 +105,24 @@ class SdoFollower:
         self._buffer = bytearray()
         self._block = BlockBuffer()
 
+    @property
+    def address(self) -> Address | None:
+        """Object of the open transfer, or None."""
+        return None if self._phase is _IDLE else _address(self._mux)
+
+    def is_block_segment(self, client: bool, data: bytes) -> bool:
+        """Whether ``data``, not yet taken, is a segment of the sub-block that runs, and no protocol step."""
+        if client:
+            return self._phase is Phase.BLOCK_WRITE_DATA and self._is_segment(data)
+        return self._phase is Phase.BLOCK_READ_DATA and data[0] != 0x80
+
     # -- frames of a client ----------------------------------------------------
 
     def request(self, t_ns: int, client: Direction, can_id: int, data: bytes) -> Sequence[Record]:
         """Take a frame from client to server."""
         if len(data) != 8:
             return (MalformedSeen(t_ns, self._bus, self._node, can_id, Fault.LENGTH, data),)
-        if self._phase is Phase.BLOCK_WRITE_DATA and self._is_segment(data):
+        if self._phase is Phase.BLOCK_WRITE_DATA and self.is_block_segment(True, data):
             self._block.add(data)
             return _NOTHING
         match data[0] >> 5:
@@ -239,7 +250,7 @@ class SdoFollower:
         elif phase is _WRITE:
             if head >> 5 == 3 and data[1:4] == self._mux and t_ns - self._start_ns <= LATE_NS:
                 return self._download_response(t_ns)
-        elif phase is Phase.BLOCK_READ_DATA and head != 0x80:
+        elif phase is Phase.BLOCK_READ_DATA and self.is_block_segment(False, data):
             self._block.add(data)
             return _NOTHING
         if head >> 5 == sdo.Command.ABORT:

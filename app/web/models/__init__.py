@@ -7,7 +7,9 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, StrictFloat, StrictInt, StrictStr
 
 from app.service.link import LinkLine, Mode
+from app.service.trace_tail import TraceBatch
 from app.service.views import AxisLine, EventLine, NodeLine, RawJson, ValueCell
+from app.web.models.trace import TraceFilter
 
 RoleName = Literal["viewer", "technician", "expert"]
 Language = Literal["en", "de"]
@@ -284,6 +286,13 @@ class EventMessage(_Envelope):
     data: EventLine
 
 
+class TraceMessage(_Envelope):
+    """Topic ``trace``: ten times a second while it is subscribed, with as many rows as a page can show."""
+
+    type: Literal["trace"] = "trace"
+    data: TraceBatch
+
+
 ServerMessage = Annotated[
     HelloMessage
     | BenchMessage
@@ -292,19 +301,21 @@ ServerMessage = Annotated[
     | NodesMessage
     | AxesMessage
     | ValuesMessage
-    | EventMessage,
+    | EventMessage
+    | TraceMessage,
     Field(discriminator="type"),
 ]
 """What the socket sends."""
 
 
 class Subscribe(BaseModel):
-    """What the page wants to hear; replaces what it wanted before."""
+    """What the page wants to hear; replaces what it wanted before. ``trace`` is the filter of the topic ``trace``."""
 
     model_config = ConfigDict(extra="forbid")
 
     type: Literal["subscribe"]
     topics: Annotated[list[Annotated[str, Field(max_length=200)]], Field(max_length=200)]
+    trace: TraceFilter | None = None
 
 
 ClientMessage = Subscribe

@@ -5,9 +5,22 @@ from __future__ import annotations
 from fastapi import APIRouter
 
 from app.web.deps import ANY_PROBLEM
-from app.web.routes import audit, devices, jobs, recordings, session, sets, settings, stop, turbine, users, writes
+from app.web.routes import (
+    audit,
+    devices,
+    jobs,
+    recordings,
+    session,
+    sets,
+    settings,
+    stop,
+    trace,
+    turbine,
+    users,
+    writes,
+)
 
-FEATURES = (session, turbine, devices, jobs, stop, writes, recordings, sets, users, audit, settings)
+FEATURES = (session, turbine, devices, jobs, stop, writes, recordings, sets, users, audit, settings, trace)
 
 
 def api_router() -> APIRouter:

@@ -1,0 +1,166 @@
+"""The last frames of a bus, kept so that any part of them can be decoded again with its context.
+
+Frames lie in chunks, each with the decoder's state before its first one. A full chunk is packed: 30 bytes a frame, and
+nothing that the garbage collector must look at, where the frame itself takes some 300. Who looks back unpacks and
+decodes what is looked at; while nobody looks, keeping a frame costs next to nothing.
+
+The receive thread writes under its lock; readers take ``chunks()`` under the same lock and read them without.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import islice
+from struct import Struct
+from typing import Any, Final
+
+from app.wire.frame import Can, Direction, Frame
+from app.wire.trace import Gap, Item
+
+LIMIT: Final = 200_000
+"""Items kept of a bus: 6 MB; 25 s of a full bus of 1 Mbit/s, some minutes of a usual one."""
+CHUNK: Final = 1000
+_PACKED: Final = Struct("<QqIBb8s")
+_NO_TIME: Final = -1
+_LENGTH: Final = 0x0F
+_TX, _EXTENDED, _REMOTE, _ERROR = 0x10, 0x20, 0x40, 0x80
+
+Snapshot = Mapping[str, Any]
+
+
+class Chunk:
+    """Items from number ``first`` on, and the state of the decoder before them."""
+
+    __slots__ = ("_bus", "_gaps", "_items", "_packed", "count", "end_ns", "first", "snapshot", "start_ns")
+
+    def __init__(self, bus: str, first: int, snapshot: Snapshot, items: Sequence[Item] = ()) -> None:
+        self._bus = bus
+        self._items: list[Item] | None = list(items)
+        self._packed = b""
+        self._gaps: dict[int, Gap] = {}
+        self.first = first
+        self.snapshot = snapshot
+        self.count = len(items)
+        self.start_ns = items[0][0] if items else 0
+        self.end_ns = items[-1][0] if items else 0
+
+    def extend(self, items: Sequence[Item]) -> None:
+        """Append; not after ``pack``."""
+        if self._items is None:
+            raise ValueError("the chunk is packed")
+        if not self.count:
+            self.start_ns = items[0][0]
+        self._items += items
+        self.count += len(items)
+        self.end_ns = items[-1][0]
+
+    def pack(self) -> list[Item]:
+        """Keep as bytes from now on; gives the items as they were."""
+        items = self._items or []
+        self._gaps = {at: item for at, item in enumerate(items) if isinstance(item, Gap)}
+        self._packed = b"".join(_pack(item) for item in items)
+        self._items = None
+        return items
+
+    def copy(self) -> Chunk:
+        """The same items; what is appended to this one later is not in it."""
+        return self if self._items is None else Chunk(self._bus, self.first, self.snapshot, self._items)
+
+    def items(self) -> Iterator[Item]:
+        """All items in order."""
+        if self._items is not None:
+            return iter(self._items)
+        return self._unpacked()
+
+    def _unpacked(self) -> Iterator[Item]:
+        bus, gaps, rx, tx = self._bus, self._gaps, Direction.RX, Direction.TX
+        for at, (t_ns, adapter_ns, can_id, flags, dlc, data) in enumerate(_PACKED.iter_unpack(self._packed)):
+            if at in gaps:
+                yield gaps[at]
+                continue
+            can = Can(
+                can_id,
+                data[: flags & _LENGTH],
+                bool(flags & _EXTENDED),
+                bool(flags & _REMOTE),
+                bool(flags & _ERROR),
+                dlc,
+            )
+            yield Frame(t_ns, bus, tx if flags & _TX else rx, can, None if adapter_ns == _NO_TIME else adapter_ns)
+
+
+def _pack(item: Item) -> bytes:
+    if isinstance(item, Gap):
+        return _PACKED.pack(item.t_ns, 0, 0, 0, 0, b"")
+    t_ns, _, direction, can, adapter_ns = item
+    if not isinstance(can, Can):
+        raise TypeError("the ring holds frames of a CAN bus")
+    flags = len(can.data) | (_TX if direction is Direction.TX else 0) | (_EXTENDED if can.extended else 0)
+    flags |= (_REMOTE if can.remote else 0) | (_ERROR if can.error else 0)
+    return _PACKED.pack(t_ns, _NO_TIME if adapter_ns is None else adapter_ns, can.can_id, flags, can.dlc, can.data)
+
+
+class FrameRing:
+    """The last ``limit`` items of ``bus``. ``snapshot`` gives the state of the decoder that is fed with the same items.
+
+    ``packed`` is called with the items of each chunk that is full.
+    """
+
+    def __init__(
+        self,
+        bus: str,
+        snapshot: Callable[[], Snapshot],
+        limit: int = LIMIT,
+        chunk: int = CHUNK,
+        packed: Callable[[Sequence[Item]], None] | None = None,
+    ) -> None:
+        self._bus = bus
+        self._snapshot = snapshot
+        self._packed = packed
+        self._limit = limit
+        self._chunk = chunk
+        self._chunks: deque[Chunk] = deque()
+        self.total = 0
+        """Items ever taken: the number of the next one."""
+
+    def extend(self, items: Sequence[Item]) -> None:
+        """Take items, before the decoder does."""
+        if not items:
+            return
+        last = self._chunks[-1] if self._chunks else None
+        if last is None or last.count >= self._chunk:
+            if last is not None:
+                full = last.pack()
+                if self._packed is not None:
+                    self._packed(full)
+            last = Chunk(self._bus, self.total, self._snapshot())
+            self._chunks.append(last)
+        last.extend(items)
+        self.total += len(items)
+        while self.total - self._chunks[0].first - self._chunks[0].count >= self._limit:
+            self._chunks.popleft()
+
+    def renew(self) -> None:
+        """Forget all: what is known of the nodes has changed, so that the states no longer fit."""
+        self._chunks.clear()
+
+    def chunks(self) -> list[Chunk]:
+        """All chunks, oldest first."""
+        chunks = list(self._chunks)
+        return [*chunks[:-1], chunks[-1].copy()] if chunks else []
+
+    def open_items(self) -> list[Item]:
+        """Items of the chunk that is not yet full."""
+        return list(self._chunks[-1].items()) if self._chunks else []
+
+    def since(self, number: int) -> tuple[int, list[Item]]:
+        """Items from ``number`` on, and the number of the first of them: a later one where that is gone."""
+        first, found = self.total, []
+        for chunk in reversed(self._chunks):
+            if chunk.first + chunk.count <= number:
+                break
+            skipped = max(0, number - chunk.first)
+            found.append(list(islice(chunk.items(), skipped, None)))
+            first = chunk.first + skipped
+        return first, [item for part in reversed(found) for item in part]
