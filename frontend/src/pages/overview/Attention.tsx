@@ -1,23 +1,42 @@
-import { IconAlertOctagon, IconAlertTriangle, IconArrowRight, IconCircleCheck } from "@tabler/icons-react";
-import { useQuery } from "@tanstack/react-query";
+import {
+  IconAlertOctagon,
+  IconAlertTriangle,
+  IconArrowRight,
+  IconCircleCheck,
+  IconInfoCircle,
+} from "@tabler/icons-react";
+import { useQueries, useQuery } from "@tanstack/react-query";
 import { Link } from "@tanstack/react-router";
-import { turbineQuery } from "../../api/queries";
+import { useState } from "react";
+import { descriptionQuery, turbineQuery } from "../../api/queries";
+import type { Turbine } from "../../api/types";
 import { type PageSearch, readSearch } from "../../frame/search";
-import { useAxes, useHearing, useLink, useNodes, useServerNow } from "../../live/live";
-import { useTexts } from "../../texts/texts";
+import { store, useAxes, useHearing, useLink, useNodes, useServerNow } from "../../live/live";
+import { type Translate, useTexts } from "../../texts/texts";
+import { placesOf } from "../../ui/devices";
+import { rawAt } from "../../ui/reading";
 import { type Finding, findingsOf } from "./attention";
+import { deviceFindings, type Watched } from "./deviceFindings";
 import classes from "./Overview.module.css";
 
 const REFRESH_MS = 1000;
+/** More than these are behind a button: the blades are to be seen as well. */
+const SHOWN = 5;
 
 export function Attention() {
   const t = useTexts();
+  const [all, setAll] = useState(false);
   const turbine = useQuery(turbineQuery).data;
   const nowMs = useServerNow(REFRESH_MS);
   const hearing = useHearing().state === "hearing";
-  const findings = findingsOf({ turbine, link: useLink(), nodes: useNodes(), axes: useAxes(), nowMs });
+  const link = useLink();
+  const watched = useWatched(turbine, t);
+  const more = link?.state === "connected" ? deviceFindings(watched) : [];
+  const findings = findingsOf({ turbine, link, nodes: useNodes(), axes: useAxes(), nowMs, more });
   // A page that hears nothing may not say that all is well.
   const allWell = hearing && findings.length === 0;
+  const shown = hearing ? findings.slice(0, all ? undefined : SHOWN) : [];
+  const left = findings.length - SHOWN;
   return (
     <section
       className={`${classes.attention} bench`}
@@ -30,22 +49,54 @@ export function Attention() {
           <IconCircleCheck size={18} aria-hidden /> {t("page.attention.none")}
         </p>
       )}
-      <ul>{hearing && findings.map((finding) => <FindingLine key={finding.id} finding={finding} />)}</ul>
+      <ul>
+        {shown.map((finding) => (
+          <FindingLine key={finding.id} finding={finding} />
+        ))}
+        {hearing && left > 0 && (
+          <li>
+            <button type="button" className={classes.more} aria-expanded={all} onClick={() => setAll(!all)}>
+              {all ? t("page.attention.fewer") : t("page.more", { count: left })}
+            </button>
+          </li>
+        )}
+      </ul>
     </section>
   );
 }
 
+/** The turbine's devices with what the socket told of them. */
+function useWatched(turbine: Turbine | undefined, t: Translate): Watched[] {
+  const places = placesOf(turbine);
+  const ids = [...new Set(places.map(({ device }) => device.description_id))];
+  const docs = useQueries({ queries: ids.map((id) => descriptionQuery(id)) });
+  return places.flatMap(({ station, device: { slug, node, description_id } }): Watched[] => {
+    const doc = docs[ids.indexOf(description_id)]?.data;
+    const cells = store.cells(slug);
+    if (!doc || !cells || station.blade === null) return [];
+    const lookup = (address: string) => rawAt(slug, address);
+    return [{ station, context: { slug, node, doc, t, lookup }, cells }];
+  });
+}
+
+const ICONS = { error: IconAlertOctagon, warning: IconAlertTriangle, info: IconInfoCircle };
+
 function FindingLine({ finding }: { finding: Finding }) {
   const t = useTexts();
-  const Icon = finding.tone === "error" ? IconAlertOctagon : IconAlertTriangle;
-  const { device } = finding;
+  const Icon = ICONS[finding.tone];
+  const { device, search: more } = finding;
   return (
     <li>
-      <Icon size={18} className={`tone-${finding.tone}`} aria-hidden />
+      <Icon size={18} className={finding.tone === "info" ? "dim" : `tone-${finding.tone}`} aria-hidden />
       <span className="visually-hidden">{t(`page.severity.${finding.tone}`)}</span>
       <span>{t(finding.key, finding.details)}</span>
       {device !== null && (
-        <Link to="/parameters" search={(before: PageSearch) => readSearch({ ...before, device })}>
+        <Link
+          to="/parameters"
+          search={(before: PageSearch) =>
+            readSearch({ ...before, q: undefined, only: undefined, device, ...more })
+          }
+        >
           {t("page.rooms.parameters")} <IconArrowRight size={15} aria-hidden />
         </Link>
       )}

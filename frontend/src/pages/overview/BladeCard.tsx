@@ -1,14 +1,20 @@
-import { IconAlertOctagon } from "@tabler/icons-react";
+import { IconAlertOctagon, IconAlertTriangle, IconArrowRight } from "@tabler/icons-react";
+import { Link } from "@tanstack/react-router";
 import { lazy, Suspense } from "react";
 import type { AxisData, DeviceRef, StationRef } from "../../api/types";
-import { useAxes, useNodes, useServerNow } from "../../live/live";
+import { type PageSearch, readSearch } from "../../frame/search";
 import { followsDemand } from "../../live/axis";
+import { useAxes, useNodes, useServerNow, useWatchDevice } from "../../live/live";
 import { figure } from "../../model/values";
 import { useTexts } from "../../texts/texts";
 import { stationName } from "../../ui/devices";
 import { age, errorCode } from "../../ui/format";
+import { BladeFacts, Fact } from "./BladeFacts";
+import { EfcChain } from "./EfcChain";
+import { PMC, PMM } from "./layout";
 import { Heard, heartbeatOf } from "./nodes";
 import classes from "./Overview.module.css";
+import { useDeviceContext } from "../../ui/reading";
 
 const AngleTrace = lazy(() => import("./AngleTrace").then((module) => ({ default: module.AngleTrace })));
 
@@ -20,6 +26,11 @@ export function BladeCard({ station }: { station: StationRef }) {
   const blade = station.blade ?? 0;
   const axis = useAxes().get(blade);
   const name = stationName(station, t);
+  const pmm = station.devices.find((device) => device.description_id === PMM);
+  const pmc = station.devices.find((device) => device.description_id === PMC);
+  useWatchDevice(pmm?.slug ?? null);
+  useWatchDevice(pmc?.slug ?? null);
+  const contexts = { pmm: useDeviceContext(pmm), pmc: useDeviceContext(pmc) };
   return (
     <article
       className={classes.card}
@@ -27,7 +38,16 @@ export function BladeCard({ station }: { station: StationRef }) {
       data-testid={`blade-${blade}`}
       data-stale={axis?.stale ?? true}
     >
-      <h2>{name}</h2>
+      <h2>
+        {name}
+        <Link
+          to="/axis"
+          search={(before: PageSearch) => readSearch({ ...before, blade: String(blade) })}
+          className={classes.toAxis}
+        >
+          {t("page.rooms.axis")} <IconArrowRight size={15} aria-hidden />
+        </Link>
+      </h2>
       <div className={`${classes.body} bench`}>
         <Angle axis={axis} />
         <DriveState axis={axis} />
@@ -35,13 +55,9 @@ export function BladeCard({ station }: { station: StationRef }) {
           {station.devices.map((device) => (
             <NodeLine key={device.slug} device={device} />
           ))}
-          <Fact name={t("page.card.battery")}>
-            <Figure number={axis?.battery_soc_pct} decimals={0} unit="%" stale={axis?.stale} />
-            <Figure number={axis?.battery_v} decimals={1} unit="V" stale={axis?.stale} />
-          </Fact>
-          <Fact name={t("page.card.dc_link")}>
-            <span />
-            <Figure number={axis?.dc_link_v} decimals={1} unit="V" stale={axis?.stale} />
+          <BladeFacts {...contexts} />
+          <Fact name={t("page.card.efc_chain")}>
+            <EfcChain {...contexts} />
           </Fact>
         </dl>
         <Suspense fallback={<div className={classes.trace} />}>
@@ -84,27 +100,38 @@ function Age({ sinceMs }: { sinceMs: number }) {
 
 function DriveState({ axis }: { axis: AxisData | undefined }) {
   const t = useTexts();
-  const fault = axis?.fault_code != null && axis.fault_code !== 0 ? axis.fault_code : null;
+  const faults = axis?.faults ?? [];
   return (
     <>
       <div className={classes.state} data-testid="state" data-stale={axis?.stale ?? true}>
         {axis?.state == null ? DASH : t(axis.state)}
       </div>
-      <div className={classes.fault} data-fault={fault !== null} data-testid="fault">
-        {fault === null ? (
+      <div className={classes.faults} data-testid="fault">
+        {faults.length === 0 && (
           <span className="dim">
             {t(axis?.fault_code === 0 ? "page.card.no_fault" : "page.card.fault_unknown")}
           </span>
-        ) : (
-          <>
-            <IconAlertOctagon size={17} aria-hidden />
-            <span>
-              <strong>{errorCode(fault)}</strong> {axis?.fault_text_key == null ? "" : t(axis.fault_text_key)}
-            </span>
-          </>
         )}
+        {faults.map((fault) => (
+          <Complaint key={`${fault.device} ${fault.code}`} {...fault} />
+        ))}
       </div>
     </>
+  );
+}
+
+function Complaint({ device, code, text_key, severity }: AxisData["faults"][number]) {
+  const t = useTexts();
+  const Icon = severity === "error" ? IconAlertOctagon : IconAlertTriangle;
+  return (
+    <div className={classes.fault} data-severity={severity}>
+      <Icon size={17} aria-hidden />
+      <span>
+        <span className="visually-hidden">{t(`page.severity.${severity}`)} </span>
+        {device.split("/").at(-1)?.toUpperCase()} <strong>{errorCode(code)}</strong>{" "}
+        {text_key === null ? t("page.card.unknown_code") : t(text_key)}
+      </span>
+    </div>
   );
 }
 
@@ -123,30 +150,5 @@ function NodeLine({ device }: { device: DeviceRef }) {
         {ageMs === null ? t("page.card.no_heartbeat") : `♥ ${age(ageMs, t.language)}`}
       </span>
     </Fact>
-  );
-}
-
-function Fact({ name, children }: { name: string; children: React.ReactNode }) {
-  return (
-    <div className={classes.fact}>
-      <dt>{name}</dt>
-      <dd>{children}</dd>
-    </div>
-  );
-}
-
-interface FigureProps {
-  number: number | null | undefined;
-  decimals: number;
-  unit: string;
-  stale: boolean | undefined;
-}
-
-function Figure({ number, decimals, unit, stale }: FigureProps) {
-  const t = useTexts();
-  return (
-    <span data-stale={stale ?? true} className={classes.figure}>
-      {number == null ? DASH : `${figure(number, decimals, t.language)} ${unit}`}
-    </span>
   );
 }

@@ -52,7 +52,12 @@ const node = (ageMs: number | null): NodeData => ({
   heartbeat_period_ms: 500,
   boots: 1,
 });
-const axis = (fault: number) => ({ blade: 1, fault_code: fault, fault_text_key: "error_code.x" }) as AxisData;
+const axis = (code: number, severity: "error" | "warning" = "error") =>
+  ({
+    blade: 1,
+    fault_code: code,
+    faults: code === 0 ? [] : [{ device: PMC, code, text_key: "error_code.x", severity }],
+  }) as unknown as AxisData;
 
 const find = (change: { link?: LinkData; node?: NodeData; axis?: AxisData }) =>
   findingsOf({
@@ -87,6 +92,14 @@ describe("needs attention", () => {
     expect(find({ link: { ...link, recording: { ...recording, state: "off", lost: 3 } } })).toEqual([
       "error page.attention.recording_lost",
       "warning page.attention.recording_off",
+    ]);
+  });
+
+  it("tells a warning of a device from a fault, after all errors", () => {
+    expect(find({ axis: axis(0x4310, "warning") })).toEqual(["warning page.attention.device_warning"]);
+    expect(find({ axis: axis(0x4310, "warning"), node: node(5000) })).toEqual([
+      "error page.attention.node_overdue",
+      "warning page.attention.device_warning",
     ]);
   });
 

@@ -1,16 +1,19 @@
 /** What needs a look, worst first. Each finding names the text and where to go. */
 import type { AxisData, Details, LinkData, NodeData, Turbine } from "../../api/types";
+import type { PageSearch } from "../../frame/search";
 import { placesOf } from "../../ui/devices";
 import { errorCode } from "../../ui/format";
 import { Heard, heartbeatOf } from "./nodes";
 
 export interface Finding {
   id: string;
-  tone: "warning" | "error";
+  tone: "error" | "warning" | "info";
   key: string;
   details: Details;
   /** Slug of the device to open, if one is meant. */
   device: string | null;
+  /** What more of the parameters' filter leads there. */
+  search?: PageSearch;
 }
 
 interface Seen {
@@ -19,11 +22,20 @@ interface Seen {
   nodes: ReadonlyMap<string, NodeData>;
   axes: ReadonlyMap<number, AxisData>;
   nowMs: number;
+  /** What the values of the devices give; see `deviceFindings`. */
+  more?: readonly Finding[];
 }
 
+const URGENCY = ["error", "warning", "info"] as const;
+
 export function findingsOf(seen: Seen): Finding[] {
-  const all = [...linkFindings(seen.link), ...axisFindings(seen), ...nodeFindings(seen)];
-  return [...all.filter((one) => one.tone === "error"), ...all.filter((one) => one.tone === "warning")];
+  const all = [
+    ...linkFindings(seen.link),
+    ...axisFindings(seen),
+    ...nodeFindings(seen),
+    ...(seen.more ?? []),
+  ];
+  return URGENCY.flatMap((tone) => all.filter((one) => one.tone === tone));
 }
 
 function linkFindings(link: LinkData | null): Finding[] {
@@ -41,28 +53,24 @@ function linkFindings(link: LinkData | null): Finding[] {
   return found;
 }
 
-function axisFindings({ axes, turbine }: Seen): Finding[] {
-  return [...axes.values()]
-    .filter((axis) => axis.fault_code !== null && axis.fault_code !== 0)
-    .map((axis) => ({
-      id: `fault_${axis.blade}`,
-      tone: "error",
-      key: "page.attention.fault",
+function axisFindings({ axes }: Seen): Finding[] {
+  return [...axes.values()].flatMap((axis) =>
+    axis.faults.map((fault): Finding => ({
+      id: `fault_${fault.device}_${fault.code}`,
+      tone: fault.severity,
+      key: `page.attention.${fault.severity === "error" ? "fault" : "device_warning"}`,
       details: {
         blade: axis.blade,
-        code: errorCode(axis.fault_code ?? 0),
-        text_key_text: axis.fault_text_key,
+        device: lastPart(fault.device),
+        code: errorCode(fault.code),
+        text_key_text: fault.text_key ?? "page.card.unknown_code",
       },
-      device: deviceOf(turbine, axis.blade, "pmc"),
-    }));
+      device: fault.device,
+    })),
+  );
 }
 
-function deviceOf(turbine: Turbine | undefined, blade: number, name: string): string | null {
-  const place = placesOf(turbine).find(
-    (one) => one.station.blade === blade && one.device.slug.endsWith(`/${name}`),
-  );
-  return place?.device.slug ?? null;
-}
+const lastPart = (slug: string) => (slug.split("/").at(-1) ?? slug).toUpperCase();
 
 function nodeFindings({ turbine, link, nodes, nowMs }: Seen): Finding[] {
   if (link?.state !== "connected") return [];

@@ -1,0 +1,91 @@
+/** One object of a device as a reading: its value in words, how fresh it is, and where it stands in the parameters. */
+import { useQuery } from "@tanstack/react-query";
+import { useMemo } from "react";
+import { descriptionQuery } from "../api/queries";
+import type { DescriptionDoc, DeviceRef, EntryDoc, Raw } from "../api/types";
+import { store, useCell, useHearing, useLink, useNodes, useServerNow } from "../live/live";
+import type { Cell } from "../live/store";
+import { type DeviceContext, shownOf } from "../model/shown";
+import { useTexts } from "../texts/texts";
+
+const REFRESH_MS = 1000;
+
+/** How old a value may be before it is shown as old, by how often the bench reads it. */
+export const FRESH_MS = { fast: 1500, slow: 4000, rare: 35_000, kept: Infinity } as const;
+export type Pace = keyof typeof FRESH_MS;
+
+export interface Reading {
+  entry: EntryDoc;
+  raw: Raw;
+  /** Value and unit, or the names of bits that are set. */
+  text: string;
+  unit: string;
+  names: string[];
+  stale: boolean;
+  ageMs: number;
+}
+
+const indexes = new WeakMap<DescriptionDoc, ReadonlyMap<string, EntryDoc>>();
+
+/** The entries of a description by address. */
+export function entriesOf(doc: DescriptionDoc): ReadonlyMap<string, EntryDoc> {
+  let found = indexes.get(doc);
+  if (!found) {
+    found = new Map(doc.entries.map((entry) => [entry.address, entry]));
+    indexes.set(doc, found);
+  }
+  return found;
+}
+
+/** Latest raw value of an object, null where it is not known. */
+export function rawAt(device: string, address: string): Raw | null {
+  const cell = store.cell(device, address);
+  return cell?.known ? cell.raw : null;
+}
+
+/** What is needed to read the values of a device; null until its description is there. */
+export function useDeviceContext(device: DeviceRef | undefined): DeviceContext | null {
+  const t = useTexts();
+  const doc = useQuery({
+    ...descriptionQuery(device?.description_id ?? ""),
+    enabled: device !== undefined,
+  }).data;
+  return useMemo(() => {
+    if (!device || !doc) return null;
+    const { slug, node } = device;
+    return { slug, node, doc, t, lookup: (address: string) => rawAt(slug, address) };
+  }, [device, doc, t]);
+}
+
+export function readingOf(
+  context: DeviceContext,
+  address: string,
+  cell: Cell | undefined,
+  pace: Pace,
+  nowMs: number,
+  silent: boolean,
+): Reading | null {
+  const entry = entriesOf(context.doc).get(address);
+  if (!entry || !cell?.known || cell.raw === null) return null;
+  const { text, unit, names } = shownOf(entry, cell.raw, context);
+  const ageMs = cell.t_ns === null ? Infinity : Math.max(0, nowMs - cell.t_ns / 1e6);
+  const stale = cell.stale || silent || ageMs > FRESH_MS[pace];
+  return { entry, raw: cell.raw, text, unit, names, stale, ageMs };
+}
+
+/** The present reading of an object, renewed as it comes and, for its age, once a second. */
+export function useReading(context: DeviceContext | null, address: string, pace: Pace): Reading | null {
+  const slug = context?.slug ?? "";
+  const cell = useCell(slug, address);
+  const silent = useUnheard(slug);
+  const nowMs = useServerNow(REFRESH_MS);
+  return context && readingOf(context, address, cell, pace, nowMs, silent);
+}
+
+/** True while nothing can come from the device: the page is deaf, the bus is gone, or its heartbeat is overdue. */
+export function useUnheard(slug: string): boolean {
+  const hearing = useHearing().state === "hearing";
+  const connected = useLink()?.state === "connected";
+  const node = useNodes().get(slug);
+  return !hearing || !connected || (node?.silent ?? false);
+}
