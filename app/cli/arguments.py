@@ -6,6 +6,7 @@ import argparse
 import math
 
 from app.model.address import is_decimal
+from app.settings import DEFAULT_PORT
 
 MAX_S = 7 * 24 * 3600.0
 
@@ -42,3 +43,8 @@ def _between(text: str, low: float, high: float, unit: str) -> float:
     if not low <= number <= high:
         raise argparse.ArgumentTypeError(f"'{text}' is not between {low:g} and {high:g} {unit}")
     return number
+
+
+def add_port(parser: argparse.ArgumentParser) -> None:
+    """``--port``: where the page is served."""
+    parser.add_argument("--port", type=port, default=DEFAULT_PORT, help="loopback port of the page; 0: any free one")

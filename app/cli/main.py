@@ -25,7 +25,8 @@ COMMANDS: Final = {
     "twin": ("twin",),
     "bus": ("scan", "read", "write", "save", "restart", "backup", "record"),
     "recordings": ("export", "recover"),
-    "serve": ("serve", "demo"),
+    "serve": ("serve",),
+    "demo": ("demo",),
 }
 """Modules of this package, each with ``add_parser``, and the commands that it adds."""
 

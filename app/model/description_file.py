@@ -16,6 +16,7 @@ from typing import Any, Final, TypeVar
 
 from app.errors import DescriptionError, UsageError
 from app.model.address import Address, Addressing, parse_address
+from app.model.bundled import bundled_folder
 from app.model.datatypes import DataType, Raw, encode_raw
 from app.model.description import (
     Access,
@@ -96,13 +97,6 @@ def problems(path: Path) -> list[Problem]:
 def builtin_folder() -> Path:
     """The folder of the descriptions."""
     return bundled_folder("od", "od")
-
-
-def bundled_folder(in_checkout: str, in_wheel: str) -> Path:
-    """A folder of data: inside the package in a wheel, else beside the package in a checkout."""
-    package = Path(__file__).resolve().parent.parent
-    bundled = package / "_bundle" / in_wheel
-    return bundled if bundled.is_dir() else package.parent / in_checkout
 
 
 @cache

@@ -11,6 +11,8 @@ from typing import Final
 
 from fastapi import Request, Response
 
+from app.model.bundled import bundled_folder
+
 _TYPES: Final = {
     ".html": "text/html; charset=utf-8",
     ".js": "text/javascript; charset=utf-8",
@@ -80,6 +82,4 @@ class PageFiles:
 
 def page_folder() -> Path:
     """Where the built page lies: inside the installed package, else in the source tree."""
-    package = Path(__file__).resolve().parent.parent
-    bundled = package / "_bundle" / "page"
-    return bundled if bundled.is_dir() else package.parent / "frontend" / "dist"
+    return bundled_folder("frontend/dist", "page")
