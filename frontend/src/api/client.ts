@@ -32,6 +32,11 @@ export function onSignedOut(told: () => void): void {
   tellSignedOut = told;
 }
 
+/** The session has ended, as the server says. */
+export function signedOut(): void {
+  tellSignedOut();
+}
+
 async function request<T>(path: string, init: RequestInit): Promise<T> {
   let response: Response;
   try {
@@ -39,7 +44,7 @@ async function request<T>(path: string, init: RequestInit): Promise<T> {
   } catch (cause) {
     throw new Unreachable(path, { cause });
   }
-  if (response.status === UNAUTHORISED && !SIGNING_IN.includes(path)) tellSignedOut();
+  if (response.status === UNAUTHORISED && !SIGNING_IN.includes(path)) signedOut();
   if (!response.ok) throw new Problem(await problemOf(response));
   return (await response.json()) as T;
 }

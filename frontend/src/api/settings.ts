@@ -2,7 +2,6 @@
 import { queryOptions } from "@tanstack/react-query";
 import { get, remove, send } from "./client";
 import type { components } from "./generated";
-import { queryClient, sessionQuery } from "./queries";
 
 type Schemas = components["schemas"];
 
@@ -145,8 +144,7 @@ export const signing = {
   out: () => send<object>("POST", "/api/logout", {}),
 };
 
-/** Everything that was asked for under another session is asked for anew. */
-export async function forgetAll(): Promise<void> {
-  await queryClient.resetQueries({ queryKey: sessionQuery.queryKey });
-  await queryClient.invalidateQueries();
+/** Another person, or nobody: nothing of what was known or drawn so far may stay. */
+export function startAfresh(): void {
+  location.reload();
 }

@@ -1,7 +1,7 @@
 import { Center, Loader, MantineProvider } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
-import { useEffect, useMemo } from "react";
-import { Problem } from "../api/client";
+import { lazy, Suspense, useEffect, useMemo } from "react";
+import { onSignedOut, Problem } from "../api/client";
 import { queryClient, sessionQuery, textsQuery, turbineQuery } from "../api/queries";
 import type { Language } from "../api/types";
 import { startLive, useBench } from "../live/live";
@@ -12,7 +12,9 @@ import { type Theme, usePageSearch } from "./search";
 import { theme as mantineTheme } from "./theme";
 
 const UNAUTHORISED = 401;
+const LOGIN_NEEDED = "login_needed";
 const RETRY_MS = 2000;
+const Login = lazy(async () => ({ default: (await import("./Login")).Login }));
 
 /** Everything around the frame: colours, access, language and texts. */
 export function Shell() {
@@ -47,6 +49,7 @@ function Gate({ wanted }: { wanted: Language | undefined }) {
   useEffect(() => {
     if (session.isSuccess) startLive();
   }, [session.isSuccess]);
+  useEffect(() => onSignedOut(() => void queryClient.invalidateQueries(sessionQuery)), []);
 
   if (session.isSuccess && texts.data) {
     return (
@@ -56,8 +59,14 @@ function Gate({ wanted }: { wanted: Language | undefined }) {
     );
   }
   const boot = bootTranslator(language);
-  if (session.error instanceof Problem && session.error.doc.status === UNAUTHORISED)
-    return <NoAccess t={boot} />;
+  if (session.error instanceof Problem && session.error.doc.status === UNAUTHORISED) {
+    if (session.error.doc.code !== LOGIN_NEEDED) return <NoAccess t={boot} />;
+    return (
+      <Suspense>
+        <Login t={boot} />
+      </Suspense>
+    );
+  }
   if (session.error ?? texts.error) return <NoAccess t={boot} unreachable />;
   return (
     <Center h="100%">

@@ -9,34 +9,32 @@ import {
   IconSun,
   IconWifiOff,
 } from "@tabler/icons-react";
-import { useQuery } from "@tanstack/react-query";
 import { useComputedColorScheme } from "@mantine/core";
-import { turbineQuery } from "../api/queries";
 import type { LinkData, Mode, RecordingStatus } from "../api/types";
 import { useHearing, useLink, useLoadHistory, useServerNow } from "../live/live";
 import { figure } from "../model/values";
 import { type Translate, useTexts } from "../texts/texts";
 import { Sparkline } from "../ui/Sparkline";
 import { clock, megabytes } from "../ui/format";
+import { ConnectMenu } from "./ConnectMenu";
 import classes from "./Frame.module.css";
 import { StopButtons } from "./StopButtons";
+import { UserMenu } from "./UserMenu";
 import { usePageSearch } from "./search";
 
 const SECOND_MS = 1000;
 
 export function TopBar() {
-  const turbine = useQuery(turbineQuery).data;
   const link = useLink();
   return (
     <header className={classes.top}>
-      <span className={classes.turbine} data-testid="turbine">
-        {turbine?.name ?? "–"}
-      </span>
+      <ConnectMenu />
       <ModeBadge mode={link?.mode ?? "none"} connected={link?.state === "connected"} />
       <BusFacts link={link} />
       <RecordingLight link={link} />
       <div className={classes.spacer} />
       <Tools />
+      <UserMenu />
       <StopButtons />
     </header>
   );

@@ -10,6 +10,10 @@ export interface PageSearch {
   theme?: Theme;
   /** The 3D dock is open unless it says "off". */
   scene?: "off";
+  /** Where it is looked at from; unset is from the front. */
+  camera?: string;
+  /** Ghosts at the demanded angles are shown unless it says "off". */
+  ghost?: "off";
   events?: "open";
   device?: string;
   q?: string;
@@ -33,6 +37,10 @@ export interface PageSearch {
   span?: string;
   /** Name of the recording or set that is open. */
   file?: string;
+  /** Filter, order (column, minus sign where descending) and hidden columns of the tables of files and sets. */
+  find?: string;
+  order?: string;
+  less?: string;
   /** The procedure that is open. */
   procedure?: string;
   /** Filter and least severity of the event drawer, and its height in pixels. */
@@ -43,6 +51,18 @@ export interface PageSearch {
   section?: string;
   person?: string;
   kind?: string;
+  /** View of the bus room, and the filters of its trace. */
+  tab?: string;
+  nodes?: string;
+  services?: string;
+  ids?: string;
+  data?: string;
+  dir?: string;
+  errors?: string;
+  /** The trace stands still. */
+  paused?: string;
+  /** Time stamp of the frame that is shown, in ns. */
+  frame?: string;
 }
 
 const TEXTS = [
@@ -54,8 +74,12 @@ const TEXTS = [
   "hide",
   "edit",
   "blade",
+  "camera",
   "span",
   "file",
+  "find",
+  "order",
+  "less",
   "procedure",
   "eventq",
   "severity",
@@ -63,6 +87,15 @@ const TEXTS = [
   "section",
   "person",
   "kind",
+  "tab",
+  "nodes",
+  "services",
+  "ids",
+  "data",
+  "dir",
+  "errors",
+  "paused",
+  "frame",
 ] as const;
 
 /** Takes what is valid and leaves the rest: a damaged link opens the page all the same. */
@@ -71,6 +104,7 @@ export function readSearch(raw: Record<string, unknown>): PageSearch {
   if (raw.lang === "en" || raw.lang === "de") search.lang = raw.lang;
   if (raw.theme === "dark" || raw.theme === "light") search.theme = raw.theme;
   if (raw.scene === "off") search.scene = raw.scene;
+  if (raw.ghost === "off") search.ghost = raw.ghost;
   if (raw.events === "open") search.events = raw.events;
   if (raw.view === "side") search.view = raw.view;
   if (raw.review === "open") search.review = raw.review;
@@ -111,4 +145,18 @@ export function usePageSearch(): [PageSearch, (change: Change) => void] {
     [navigate],
   );
   return [search, update];
+}
+
+/** Goes to a section of the settings; what the URL holds of other rooms goes along. */
+export function useOpenSettings(): (section: string) => void {
+  const navigate = useNavigate();
+  return useCallback(
+    (section: string) => {
+      void navigate({
+        to: "/settings",
+        search: (before: PageSearch) => readSearch({ ...before, section }),
+      });
+    },
+    [navigate],
+  );
 }

@@ -1,0 +1,125 @@
+import { Menu, UnstyledButton } from "@mantine/core";
+import { IconCheck, IconChevronDown, IconPlug, IconPlugOff, IconSettings } from "@tabler/icons-react";
+import { useMutation, useQuery } from "@tanstack/react-query";
+import { queryClient, turbineQuery } from "../api/queries";
+import { connecting, knownTurbinesQuery } from "../api/settings";
+import { useTexts } from "../texts/texts";
+import { notify } from "../ui/notices";
+import { storyOf } from "../ui/problem";
+import classes from "./Frame.module.css";
+import { useRole } from "./role";
+import { useOpenSettings } from "./search";
+
+/** The turbine that is connected, and the way to another one, or to none. */
+export function ConnectMenu() {
+  const t = useTexts();
+  const turbine = useQuery(turbineQuery).data;
+  const { connect, disconnect, busy } = useConnecting();
+  const name = turbine?.name ?? t("page.connect.none");
+  return (
+    <Menu position="bottom-start" width={340} keepMounted={false}>
+      <Menu.Target>
+        <UnstyledButton
+          className={classes.connect}
+          aria-label={t("page.connect.open", { turbine: name })}
+          data-testid="connect-menu"
+        >
+          <span className={classes.turbine} data-testid="turbine">
+            {busy ? t("page.connect.busy") : name}
+          </span>
+          <IconChevronDown size={18} aria-hidden />
+        </UnstyledButton>
+      </Menu.Target>
+      <Menu.Dropdown>
+        <Choices connect={connect} disconnect={disconnect} connected={turbine !== undefined} busy={busy} />
+      </Menu.Dropdown>
+    </Menu>
+  );
+}
+
+interface ChoicesProps {
+  connect: (slug: string) => void;
+  disconnect: () => void;
+  connected: boolean;
+  busy: boolean;
+}
+
+function Choices({ connect, disconnect, connected, busy }: ChoicesProps) {
+  const t = useTexts();
+  const { why } = useRole();
+  const known = useQuery(knownTurbinesQuery);
+  const openSettings = useOpenSettings();
+  const reason = why("technician");
+  const locked = reason !== null || busy;
+  return (
+    <>
+      <Menu.Label>{t("page.connect.choose")}</Menu.Label>
+      {reason !== null && <Menu.Label style={{ fontWeight: 400 }}>{reason}</Menu.Label>}
+      {known.isError && <Menu.Label>{storyOf(known.error, t).happened}</Menu.Label>}
+      {(known.data ?? []).map((one) => (
+        <Menu.Item
+          key={one.slug}
+          mih={48}
+          disabled={locked || one.connected}
+          leftSection={
+            one.connected ? <IconCheck size={18} aria-hidden /> : <IconPlug size={18} aria-hidden />
+          }
+          onClick={() => connect(one.slug)}
+          data-testid={`connect-${one.slug}`}
+        >
+          <div>
+            {one.name}
+            {one.connected && ` · ${t("page.connect.is")}`}
+          </div>
+          <div className="dim" style={{ fontSize: 12.5, overflowWrap: "anywhere" }}>
+            {one.buses.join(", ")}
+          </div>
+        </Menu.Item>
+      ))}
+      <Menu.Divider />
+      <Menu.Item
+        mih={40}
+        disabled={locked || !connected}
+        leftSection={<IconPlugOff size={18} aria-hidden />}
+        onClick={disconnect}
+        data-testid="disconnect"
+      >
+        {t("page.connect.disconnect")}
+      </Menu.Item>
+      <Menu.Item
+        mih={40}
+        leftSection={<IconSettings size={18} aria-hidden />}
+        onClick={() => openSettings("turbines")}
+      >
+        {t("page.connect.manage")}
+      </Menu.Item>
+    </>
+  );
+}
+
+function useConnecting(): Omit<ChoicesProps, "connected"> {
+  const t = useTexts();
+  const failed = (title: string) => (error: unknown) => {
+    const story = storyOf(error, t);
+    notify({ tone: "error", title, lines: [story.happened, story.next] });
+  };
+  const settle = async () => {
+    await queryClient.invalidateQueries({ queryKey: turbineQuery.queryKey });
+    await queryClient.invalidateQueries({ queryKey: knownTurbinesQuery.queryKey });
+  };
+  const connect = useMutation({
+    mutationFn: connecting.connect,
+    onError: failed(t("page.connect.failed")),
+    onSettled: settle,
+  });
+  const disconnect = useMutation({
+    mutationFn: connecting.disconnect,
+    onError: failed(t("page.connect.disconnect_failed")),
+    onSettled: settle,
+  });
+  return {
+    connect: connect.mutate,
+    disconnect: () => disconnect.mutate(),
+    busy: connect.isPending || disconnect.isPending,
+  };
+}
