@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Final, Literal
 
 from app.model.address import Address
-from app.model.description import Description, Entry
+from app.model.description import Description, Entry, Kind
 from app.model.values import quantity_of, show
 from app.service.devices import Target, decode
 from app.wire.emcy import NO_ERROR, emcy_text_key
@@ -40,11 +40,13 @@ _MAX_BYTES: Final = 64
 class TraceItem:
     """One object with the value that a frame brought; ``text`` is None where it names the object only.
 
+    ``name`` is that of the object, ``sub`` that of its sub-index; None where nothing is known.
     ``key`` is the text key of an enumeration's value; ``bits`` are those of the bits that are set.
     """
 
     address: str
     name: str | None
+    sub: str | None
     text: str | None
     unit: str
     key: str | None
@@ -108,15 +110,14 @@ class Namer:
         target = self._targets.get((bus, node))
         entry = None if target is None else target.description.entries.get(address)
         if target is None or entry is None:
-            return TraceItem(address.short, None, None if data is None else plain(data), "", None, ())
-        if data is None:
-            return TraceItem(address.short, entry.title, None, "", None, ())
-        raw = decode(entry, data)
-        if isinstance(raw, bytes):
-            return TraceItem(address.short, entry.title, plain(raw), "", None, ())
+            return TraceItem(address.short, None, None, None if data is None else plain(data), "", None, ())
+        name, sub = (entry.name, None) if entry.kind is Kind.VAR else (entry.object_name, entry.name)
+        raw = None if data is None else decode(entry, data)
+        if raw is None or isinstance(raw, bytes):
+            return TraceItem(address.short, name, sub, None if raw is None else plain(raw), "", None, ())
         unit = quantity_of(entry, target.lookup).unit
         key, bits = _named(target.description, entry, raw)
-        return TraceItem(address.short, entry.title, show(entry, raw, target.lookup), unit, key, bits)
+        return TraceItem(address.short, name, sub, show(entry, raw, target.lookup), unit, key, bits)
 
 
 def plain(data: bytes) -> str:

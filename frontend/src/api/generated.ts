@@ -1201,6 +1201,7 @@ export interface components {
          *     ``fault_code`` is that of the worst of ``faults``. ``demand_deg`` is None while the axis does not follow a target
          *     position. ``current_pct`` is in per cent of the rated current.
          *     ``stale``: the position is not known, older than a second, or its node is silent.
+         *     ``look`` sums up what a picture of the blade shows, the worst first: what is not the present, then complaints.
          */
         AxisLine: {
             /** Battery Soc Pct */
@@ -1223,6 +1224,11 @@ export interface components {
             faults: components["schemas"]["FaultLine"][];
             /** Following Error Deg */
             following_error_deg: number | null;
+            /**
+             * Look
+             * @enum {string}
+             */
+            look: "unknown" | "stale" | "idle" | "enabled" | "warning" | "fault";
             /** Position Deg */
             position_deg: number | null;
             /** Position T Ns */
@@ -2837,6 +2843,7 @@ export interface components {
          * TraceItem
          * @description One object with the value that a frame brought; ``text`` is None where it names the object only.
          *
+         *     ``name`` is that of the object, ``sub`` that of its sub-index; None where nothing is known.
          *     ``key`` is the text key of an enumeration's value; ``bits`` are those of the bits that are set.
          */
         TraceItem: {
@@ -2848,6 +2855,8 @@ export interface components {
             key: string | null;
             /** Name */
             name: string | null;
+            /** Sub */
+            sub: string | null;
             /** Text */
             text: string | null;
             /** Unit */

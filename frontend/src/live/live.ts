@@ -1,5 +1,7 @@
 /** The one live store and socket of the page, and the hooks by which components see them. */
 import { useCallback, useEffect, useState, useSyncExternalStore } from "react";
+import type { TraceFilter } from "../api/trace";
+import { FrameStore, type TraceView } from "./frames";
 import { LiveSocket } from "./socket";
 import { type Cell, LiveStore } from "./store";
 
@@ -12,12 +14,13 @@ function schedule(flush: () => void): void {
 }
 
 export const store = new LiveStore(schedule, () => Date.now());
+export const frames = new FrameStore(schedule);
 
 let socket: LiveSocket | null = null;
 
 export function startLive(): void {
   const scheme = location.protocol === "https:" ? "wss" : "ws";
-  socket ??= new LiveSocket(`${scheme}://${location.host}/api/ws`, store);
+  socket ??= new LiveSocket(`${scheme}://${location.host}/api/ws`, store, frames);
 }
 
 function useTopic<T>(topic: string, read: () => T): T {
@@ -45,6 +48,14 @@ export function useDeviceVersion(device: string): number {
 /** Keeps the values of the device coming while the component is there. */
 export function useWatchDevice(slug: string | null): void {
   useEffect(() => (slug === null ? undefined : socket?.watchDevice(slug)), [slug]);
+}
+
+/** The rows of the trace that the page keeps. */
+export const useFrames = (): TraceView => useSyncExternalStore(frames.subscribe, () => frames.view);
+
+/** Has the running trace come with this number while it is called for. */
+export function watchTrace(filter: TraceFilter, id: number): () => void {
+  return socket?.watchTrace({ ...filter, id }) ?? (() => undefined);
 }
 
 /** The server's clock, ms, renewed every `everyMs`: for ages and running clocks. */
