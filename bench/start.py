@@ -23,6 +23,7 @@ from typing import Final, NamedTuple
 from playwright.sync_api import Browser, Page, sync_playwright
 
 from bench._cpu import tree_cpu_s
+from bench._priority import preferred
 from bench._process import Child
 from bench._result import Result
 
@@ -70,13 +71,13 @@ class Idle(NamedTuple):
 
 
 def run(full: bool) -> Result:
-    """Three warm starts and 10 s of idling; nine and 60 s in the long form. Medians count."""
+    """Four warm starts and 8 s of idling; nine and 60 s in the long form. The median start counts."""
     return measure(9, 60.0) if full else measure(4, 8.0)
 
 
 def measure(starts: int, idle_s: float) -> Result:
     """Start, open, wait for values, end; the last one is left alone for a while."""
-    with tempfile.TemporaryDirectory() as name, sync_playwright() as playwright:
+    with preferred() as scheduling, tempfile.TemporaryDirectory() as name, sync_playwright() as playwright:
         data = Path(name)
         chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=list(FLAGS))
         with _started(chromium, data):
@@ -96,6 +97,7 @@ def measure(starts: int, idle_s: float) -> Result:
         min(START_LIMIT_S / live_s, IDLE_LIMIT / alone.total),
         1.0,
         (
+            f"{starts} warm starts, {idle_s:g} s of idling; scheduling: {scheduling}",
             f"start to three blades with live angles: {live_s:.2f} s, limit {START_LIMIT_S:g} s "
             f"({' '.join(f'{each.live_s:.2f}' for each in times)}); address printed after {printed_s:.2f} s",
             f"idle, one page open: {_shares(alone)} of a core, limit {IDLE_LIMIT:.0%}",

@@ -16,6 +16,7 @@ from typing import Final
 
 from app import __version__
 from app.cli.output import Output
+from app.cli.runtime import calm_collector
 from app.errors import HubsideError, UsageError
 from app.model.texts import load_texts
 from app.settings import settings_from
@@ -70,6 +71,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _main(arguments: Sequence[str] | None) -> int:
+    calm_collector()
     given = sys.argv[1:] if arguments is None else arguments
     parsed = build_parser(given).parse_args(given)
     logging.basicConfig(

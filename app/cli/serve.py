@@ -14,6 +14,7 @@ from typing import Any
 from app.cli.arguments import add_port
 from app.cli.connecting import SWITCH_INTERVAL_S, make_bench
 from app.cli.output import Output
+from app.cli.runtime import spare_collector
 from app.cli.targets import add_connection
 from app.errors import NoAnswerError
 from app.recording.recover import recover_all
@@ -51,6 +52,7 @@ async def _serve(arguments: argparse.Namespace, output: Output) -> int:
         page: Any = await asyncio.to_thread(importlib.import_module, "app.cli.page")
         async with page.serve_page(arguments, bench) as url:
             await connecting
+            spare_collector()
             output.result({"url": url}, output.texts("cli.page", url=url))
             output.say("cli.demo_data", folder=settings.data)
             output.say("cli.stop_hint")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import gc
 import signal
 import sys
 import threading
@@ -11,6 +10,7 @@ from pathlib import Path
 
 from app.cli.arguments import bitrate, milliseconds
 from app.cli.output import Output
+from app.cli.runtime import spare_collector
 from app.errors import BusOpenError, UsageError
 from app.model.address import is_decimal
 from app.model.description_file import load_builtin
@@ -40,7 +40,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 def run(arguments: argparse.Namespace, output: Output) -> int:
     """Serve until interrupted."""
     sys.setswitchinterval(SWITCH_INTERVAL_S)
-    gc.freeze()
+    spare_collector()
     host, port = _address(arguments.can)
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
