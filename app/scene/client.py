@@ -1,43 +1,73 @@
-"""What the browser gets of the 3D client: its own page, shown bare and framed so that all three blades are seen."""
+"""What the browser gets of the 3D client: its own page, shown bare, with the script that ties it to our page."""
 
 from __future__ import annotations
 
-import math
-from typing import Final
+import json
+from functools import cache
+from pathlib import Path
+from typing import Any, Final
 
-CAMERA_M: Final = (-48.5, -24.5, 9.5)
-"""From upwind, aside and above, so far away that perspective shortens no blade much."""
-LOOK_AT_M: Final = (0.6, -0.6, 2.6)
-_HALF_HEIGHT_M: Final = 13.6
-_HALF_WIDTH_M: Final = 14.6
-"""What must be seen around the point looked at, margins included."""
+from app.scene.blade import ROOT_M, TIP_M
+from app.scene.cameras import CAMERAS, Camera
+from app.scene.hub import BLADES, NOSE, ROTOR, demand_node, selected_node
+from app.scene.marks import NAMED_DEG, direction, label_place
+from app.scene.solids import Vector, rotation
 
-_DISTANCE_M: Final = math.dist(CAMERA_M, LOOK_AT_M)
-FOV_RAD: Final = 2 * math.atan(_HALF_HEIGHT_M / _DISTANCE_M)
-"""Vertical angle of view where the frame is as wide as high, or wider."""
-
-_BARE: Final = """<style>
-html, body, #root {{ height: 100%; margin: 0; overflow: hidden; }}
-body :not(canvas):not(:has(canvas)):not(style):not(script) {{ display: none !important; }}
-</style><script>
-// The client reconnects only while its window has the focus, which a docked frame seldom has.
-Document.prototype.hasFocus = () => true;
-// It also prepares a sorter for point clouds that makes code from text: our policy refuses that, this view needs none.
-addEventListener("unhandledrejection", (event) => event.reason instanceof EvalError && event.preventDefault());
-// A narrow frame needs a wider angle; the client takes it from its address.
-const query = new URLSearchParams(location.search);
-const half = Math.max({half_height:.4f}, {half_width:.4f} * innerHeight / Math.max(1, innerWidth));
-if (!query.has("initialCameraFov")) {{
-  query.set("initialCameraFov", (2 * Math.atan(half)).toFixed(4));
-  history.replaceState(null, "", "?" + query);
-}}
-</script>"""
-"""The rule names no class of the client, for they change with every version: whatever neither is nor holds a canvas
-(control panel, notices, dialogs) is not shown."""
+_HERE: Final = Path(__file__).parent
+_SHAFT: Final[Vector] = (1.0, 0.0, 0.0)
+_LABEL_M: Final = ROOT_M + (TIP_M - ROOT_M) * 0.62
+"""Where along a blade its label belongs."""
 
 
 def bare_page(page: bytes) -> bytes:
     """The client's page with our style and script at the start of its head, before anything of its own runs."""
-    ours = _BARE.format(half_height=_HALF_HEIGHT_M / _DISTANCE_M, half_width=_HALF_WIDTH_M / _DISTANCE_M)
     head, mark, rest = page.partition(b"<head>")
-    return head + mark + ours.encode() + rest
+    return head + mark + _ours() + rest
+
+
+@cache
+def _ours() -> bytes:
+    style = (_HERE / "bridge.css").read_text(encoding="utf-8")
+    script = (_HERE / "bridge.js").read_text(encoding="utf-8")
+    script = script.replace("/*SCENE*/ null", json.dumps(scene_facts()))
+    return f"<style>{style}</style><script>{script}</script>".encode()
+
+
+def scene_facts() -> dict[str, Any]:
+    """What the script must know of the scene: cameras, nodes that a view sets itself, places of labels."""
+    blades = [{"blade": blade, "selected": selected_node(blade), "demand": demand_node(blade)} for blade in BLADES]
+    return {
+        "rotor": ROTOR,
+        "nose": NOSE,
+        "cameras": [_camera(camera) for camera in CAMERAS],
+        "blades": blades,
+        "places": [place for blade in BLADES for place in _places(blade)],
+    }
+
+
+def _camera(camera: Camera) -> dict[str, Any]:
+    return {
+        "name": camera.name,
+        "position": camera.position_m,
+        "look_at": camera.look_at_m,
+        "half": camera.half_m,
+        "nose_off": camera.nose_off,
+        "blade": camera.blade,
+    }
+
+
+def _places(blade: int) -> list[dict[str, Any]]:
+    """Places of labels in rotor axes: the blade's, its root's, and those of the named marks, seen from outside only."""
+    turn = rotation(_SHAFT, 120.0 * (blade - 1))
+
+    def turned(point: Vector) -> list[float]:
+        return [round(float(one), 4) for one in turn @ point]
+
+    places = [
+        {"id": f"blade-{blade}", "position": turned((0.0, 0.0, _LABEL_M)), "normal": None},
+        {"id": f"root-{blade}", "position": turned((0.0, 0.0, ROOT_M + 1.9)), "normal": None},
+    ]
+    for degrees in NAMED_DEG:
+        position, normal = turned(label_place(degrees)), turned(direction(degrees))
+        places.append({"id": f"mark-{blade}-{degrees}", "position": position, "normal": normal})
+    return places

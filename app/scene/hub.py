@@ -1,120 +1,209 @@
-"""The hub with its blades as a scene: the latest angles of the live state, coloured by state.
+"""The rotor as a scene: the latest angles of the live state, coloured by state, on a turning hub.
 
-Only what was seen on the wire moves a blade; a value that is stale or unknown is shown as such (grey), never guessed.
+Only what was seen on the wire moves anything; what is stale or unknown is shown as such (grey, seen through), never
+guessed. The scene is one for all viewers; what differs between them (camera, selection, nose, ghosts) each view sets
+for itself by the nodes named here (``app.scene.client``).
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from enum import Enum
 from typing import Any, Final
 
-import numpy as np
 import viser
 
-from app.scene import geometry
-from app.scene.client import CAMERA_M, FOV_RAD, LOOK_AT_M
+from app.scene import machinery, marks
+from app.scene.blade import PITCH_AXIS, ROOT_M, TIP_M, blade_mesh, root_radius_m
+from app.scene.cameras import FRONT, fov_rad
+from app.scene.look import UNKNOWN_BLADE, UNKNOWN_ROTOR, BladePose, BladeState, Rgb, RotorPose
 from app.scene.server import start_server
+from app.scene.solids import Mesh, quaternion, torus
 
-
-class BladeState(Enum):
-    """How a blade looks. The value is its colour (red, green, blue)."""
-
-    UNKNOWN = (120, 124, 130)
-    STALE = (90, 94, 100)
-    IDLE = (222, 226, 230)
-    ENABLED = (96, 178, 255)
-    WARNING = (245, 176, 65)
-    FAULT = (231, 76, 60)
-
-
-@dataclass(frozen=True, slots=True)
-class BladePose:
-    """What is shown of one blade: ``angle_deg`` None where no angle was ever seen."""
-
-    angle_deg: float | None
-    state: BladeState
-    label: str
-
+__all__ = ["BLADES", "BladePose", "BladeState", "HubScene", "RotorPose"]
 
 BLADES: Final = (1, 2, 3)
-_LABEL_SCALE: Final = 1.3
-_HUB_COLOUR: Final = (176, 184, 192)
-_BEARING_COLOUR: Final = (88, 98, 110)
-_MARK_COLOUR: Final = (255, 200, 60)
+ROTOR: Final = "/rotor"
+NOSE: Final = f"{ROTOR}/nose"
+_SHAFT: Final = (1.0, 0.0, 0.0)
+_UP: Final = (0.0, 0.0, 1.0)
+_TOWER_M: Final = 26.0
+_WIND_AT_M: Final = (-4.0, TIP_M * 0.62, -TIP_M * 0.62)
+"""Beside the tower, where no blade hides it for long."""
+_WIND_LENGTH_M: Final = 0.8
+"""Of the arrow, for each m/s of wind."""
+_WHITE: Final[Rgb] = (226, 231, 236)
+_GROUND: Final[Rgb] = (138, 150, 162)
+"""Nacelle and tower: there, but not what one looks for."""
+_CAST: Final[Rgb] = (120, 130, 140)
+_STEEL: Final[Rgb] = (78, 88, 99)
+_DARK: Final[Rgb] = (44, 52, 61)
+_DRIVE: Final[Rgb] = (58, 110, 165)
+_MOTOR: Final[Rgb] = (40, 78, 120)
+_BATTERY: Final[Rgb] = (196, 150, 60)
+_CABINET: Final[Rgb] = (190, 197, 204)
+_MARK: Final[Rgb] = (245, 247, 250)
+_NAMED: Final[Rgb] = (255, 205, 70)
+_FEATHER: Final[Rgb] = (88, 214, 141)
+_POINTER: Final[Rgb] = (255, 120, 60)
+_SELECTED: Final[Rgb] = (60, 150, 255)
+_WIND: Final[Rgb] = (90, 190, 255)
+_GHOST: Final[Rgb] = (150, 205, 255)
+_GHOST_OPACITY: Final = 0.40
+_HALO_OPACITY: Final = 0.75
+
+
+def blade_node(blade: int) -> str:
+    """The node of a blade's station: turns with the rotor, not with the pitch."""
+    return f"{ROTOR}/blade-{blade}"
+
+
+def selected_node(blade: int) -> str:
+    """What marks the blade as selected; each view shows or hides it."""
+    return f"{blade_node(blade)}/selected"
+
+
+def demand_node(blade: int) -> str:
+    """What holds the ghost at the demanded angle; each view shows or hides it."""
+    return f"{blade_node(blade)}/demand"
+
+
+class _Blade:
+    """The nodes of one blade."""
+
+    def __init__(self, scene: viser.SceneApi, blade: int) -> None:
+        self._scene = scene
+        root = blade_node(blade)
+        scene.add_frame(root, wxyz=quaternion(_SHAFT, 120.0 * (blade - 1)), show_axes=False)
+        self._add_machinery(root)
+        self._add_scale(root)
+        self.pitch = scene.add_frame(f"{root}/pitch", show_axes=False)
+        self.mesh = self._mesh(f"{root}/pitch/blade", blade_mesh(), BladeState.UNKNOWN.rgb)
+        # A node must have a callback to tell of clicks at all; the view takes it from there, for its own page alone.
+        self.mesh.on_click(_only_select)
+        self._mesh(f"{root}/pitch/bolts", machinery.bolts(), _STEEL)
+        self._mesh(f"{root}/pitch/pointer", marks.pointer(), _POINTER)
+        self.halo = self._mesh(f"{root}/halo", machinery.halo(), BladeState.FAULT.rgb, opacity=_HALO_OPACITY)
+        self.halo.visible = False
+        scene.add_frame(demand_node(blade), show_axes=False)
+        self.ghost = scene.add_frame(f"{demand_node(blade)}/pitch", show_axes=False, visible=False)
+        self._mesh(f"{demand_node(blade)}/pitch/ghost", blade_mesh(), _GHOST, opacity=_GHOST_OPACITY)
+        scene.add_frame(selected_node(blade), show_axes=False, visible=False)
+        ring = torus(root_radius_m() * 1.32, 0.13, ROOT_M + 0.25)
+        self._mesh(f"{selected_node(blade)}/ring", ring, _SELECTED)
+
+    def _add_machinery(self, root: str) -> None:
+        self._mesh(f"{root}/bearing", machinery.bearing(), _STEEL)
+        self._mesh(f"{root}/drive", machinery.drive(), _DRIVE)
+        self._mesh(f"{root}/motor", machinery.motor(), _MOTOR)
+        self._mesh(f"{root}/battery", machinery.battery(), _BATTERY)
+        self._mesh(f"{root}/cabinet", machinery.cabinet(), _CABINET)
+
+    def _add_scale(self, root: str) -> None:
+        self._mesh(f"{root}/collar", marks.collar(), _DARK)
+        self._mesh(f"{root}/ticks", marks.ticks(), _MARK)
+        self._mesh(f"{root}/named", marks.named_ticks(), _NAMED)
+        self._mesh(f"{root}/feather", marks.feather_tick(), _FEATHER)
+
+    def _mesh(self, name: str, mesh: Mesh, colour: Rgb, opacity: float | None = None) -> Any:
+        return _add(self._scene, name, mesh, colour, opacity)
+
+    def show(self, pose: BladePose, before: BladePose | None) -> None:
+        """Change what is different from ``before``."""
+        if pose.angle_deg is not None and (before is None or before.angle_deg != pose.angle_deg):
+            self.pitch.wxyz = quaternion(PITCH_AXIS, pose.angle_deg)
+        if before is None or before.state is not pose.state:
+            self.mesh.color = pose.state.rgb
+            self.mesh.opacity = None if pose.state.opacity == 1.0 else pose.state.opacity
+            self.halo.visible = pose.state is BladeState.FAULT
+        if pose.demand_deg is not None and (before is None or before.demand_deg != pose.demand_deg):
+            self.ghost.wxyz = quaternion(PITCH_AXIS, pose.demand_deg)
+        if before is None or before.shows_demand is not pose.shows_demand:
+            self.ghost.visible = pose.shows_demand
 
 
 class HubScene:
-    """A rotor of three blades in its own 3D server. ``show`` may be called from any thread."""
+    """A rotor of three blades in its own 3D server. Its methods may be called from any one thread at a time."""
 
     def __init__(self, secret: str) -> None:
         self.secret = secret
         """What a request must carry in ``app.scene.server.SECRET_HEADER``."""
         self._server = start_server(secret)
-        self._pitch: dict[int, Any] = {}
-        self._mesh: dict[int, Any] = {}
-        self._label: dict[int, Any] = {}
         self._shown: dict[int, BladePose] = {}
-        self._build(self._server)
+        self._rotor_shown = UNKNOWN_ROTOR
+        scene = self._server.scene
+        self._set_up(self._server)
+        self._rotor = scene.add_frame(ROTOR, show_axes=False)
+        _add(scene, f"{ROTOR}/casting", machinery.casting(), _CAST)
+        _add(scene, NOSE, machinery.nose(), _WHITE)
+        _add(scene, "/nacelle", machinery.nacelle(), _GROUND)
+        _add(scene, "/tower", machinery.tower(_TOWER_M), _GROUND)
+        self._wind = scene.add_frame("/wind", position=_WIND_AT_M, show_axes=False, visible=False)
+        self._arrow = _add(scene, "/wind/arrow", machinery.arrow().moved((-1.0, 0.0, 0.0)), _WIND)
+        self._blades = {blade: _Blade(scene, blade) for blade in BLADES}
+        self.forget()
 
     @property
     def port(self) -> int:
         """The loopback port of the 3D server."""
         return int(self._server.get_port())
 
+    @property
+    def watched(self) -> bool:
+        """Somebody looks at it."""
+        return bool(self._server.get_clients())
+
     def show(self, poses: Mapping[int, BladePose]) -> None:
         """Move and colour the blades; what did not change is not sent."""
         with self._server.atomic():
             for blade, pose in poses.items():
-                if self._shown.get(blade) != pose and blade in self._pitch:
-                    self._show(blade, pose)
+                before = self._shown.get(blade)
+                if before != pose and blade in self._blades:
+                    self._shown[blade] = pose
+                    self._blades[blade].show(pose, before)
+
+    def show_rotor(self, pose: RotorPose) -> None:
+        """Turn the rotor and the wind's arrow; what did not change is not sent."""
+        before, self._rotor_shown = self._rotor_shown, pose
+        if pose == before:
+            return
+        with self._server.atomic():
+            if pose.azimuth_deg != before.azimuth_deg:
+                self._rotor.wxyz = quaternion(_SHAFT, pose.azimuth_deg or 0.0)
+            known = pose.wind_mps is not None and pose.wind_deg is not None
+            if pose.wind_mps is not None and pose.wind_deg is not None:
+                self._arrow.scale = max(1.0, pose.wind_mps * _WIND_LENGTH_M)
+                # Wind from the right (positive, seen from above) blows to the left: +y.
+                self._wind.wxyz = quaternion(_UP, pose.wind_deg)
+            if self._wind.visible is not known:
+                self._wind.visible = known
+
+    def forget(self) -> None:
+        """Show nothing as known, so that who looks next sees nothing that is over."""
+        self.show(dict.fromkeys(BLADES, UNKNOWN_BLADE))
+        self.show_rotor(UNKNOWN_ROTOR)
 
     def close(self) -> None:
         """Stop the server."""
         self._server.stop()
 
-    def _show(self, blade: int, pose: BladePose) -> None:
-        before = self._shown.get(blade)
-        self._shown[blade] = pose
-        if pose.angle_deg is not None and (before is None or before.angle_deg != pose.angle_deg):
-            self._pitch[blade].wxyz = geometry.quaternion((0.0, 0.0, 1.0), pose.angle_deg)
-        if before is None or before.state is not pose.state:
-            self._mesh[blade].color = pose.state.value
-        if before is None or before.label != pose.label:
-            self._label[blade].text = pose.label
-
-    def _build(self, server: viser.ViserServer) -> None:
+    @staticmethod
+    def _set_up(server: viser.ViserServer) -> None:
         scene = server.scene
         scene.set_up_direction("+z")
         scene.world_axes.visible = False
-        scene.configure_default_lights(True)
-        server.initial_camera.fov = FOV_RAD
-        server.initial_camera.position = CAMERA_M
-        server.initial_camera.look_at = LOOK_AT_M
-        spinner = geometry.spinner()
-        scene.add_mesh_simple("/hub", spinner.vertices, spinner.faces, color=_HUB_COLOUR)
-        for blade in BLADES:
-            self._build_blade(server, blade)
+        # Shadows cost more than all the rest, and reach only 20 m from the camera.
+        scene.configure_default_lights(True, cast_shadow=False)
+        scene.add_light_directional("/upwind", color=(255, 250, 240), intensity=1.1, position=(-30.0, -18.0, 14.0))
+        server.initial_camera.fov = fov_rad(FRONT, 1.0)
+        server.initial_camera.position = FRONT.position_m
+        server.initial_camera.look_at = FRONT.look_at_m
 
-    def _build_blade(self, server: viser.ViserServer, blade: int) -> None:
-        scene = server.scene
-        root = f"/rotor/blade-{blade}"
-        azimuth = geometry.quaternion((1.0, 0.0, 0.0), 120.0 * (blade - 1))
-        scene.add_frame(root, wxyz=azimuth, show_axes=False)
-        bearing = geometry.ring(geometry.ROOT_RADIUS_M * 1.05, 0.35, geometry.HUB_RADIUS_M - 0.1)
-        scene.add_mesh_simple(f"{root}/bearing", bearing.vertices, bearing.faces, color=_BEARING_COLOUR)
-        marks, _degrees = geometry.scale_marks(geometry.ROOT_RADIUS_M * 1.35, geometry.HUB_RADIUS_M + 0.3)
-        scene.add_line_segments(f"{root}/scale", marks, colors=_MARK_COLOUR, thickness=2.0, thickness_units="screen")
-        self._pitch[blade] = scene.add_frame(f"{root}/pitch", show_axes=False)
-        mesh = geometry.blade()
-        self._mesh[blade] = scene.add_mesh_simple(
-            f"{root}/pitch/blade", mesh.vertices, mesh.faces, color=BladeState.UNKNOWN.value, side="double"
-        )
-        pointer = geometry.box((0.12, 0.75, 0.12), (0.0, -geometry.ROOT_RADIUS_M * 1.35 - 0.3, 0.0))
-        lifted = pointer.vertices + np.array([0.0, 0.0, geometry.HUB_RADIUS_M + 0.3], dtype=np.float32)
-        scene.add_mesh_simple(f"{root}/pitch/pointer", lifted, pointer.faces, color=_MARK_COLOUR)
-        place = (0.0, 0.0, geometry.HUB_RADIUS_M + geometry.SPAN_M * 0.62)
-        self._label[blade] = scene.add_label(
-            f"{root}/label", f"{blade}", position=place, font_screen_scale=_LABEL_SCALE, anchor="center-center"
-        )
+
+def _only_select(_event: object) -> None:
+    """Nothing: a click in the 3D view can select an axis on its own page, and nothing else."""
+
+
+def _add(scene: viser.SceneApi, name: str, mesh: Mesh, colour: Rgb, opacity: float | None = None) -> Any:
+    return scene.add_mesh_simple(
+        name, mesh.vertices, mesh.faces, color=colour, opacity=opacity, cast_shadow=False, receive_shadow=False
+    )

@@ -32,7 +32,7 @@ def start_server(secret: str) -> viser.ViserServer:
         server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
     for message in (viser_messages.ShareUrlRequest, viser_messages.ShareUrlDisconnect):
         server._websock_server.unregister_handler(message)
-    server.gui.configure_theme(show_share_button=False, show_logo=False, dark_mode=True)
+    server.gui.configure_theme(show_share_button=False, show_logo=False, dark_mode=False)
     return server
 
 

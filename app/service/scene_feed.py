@@ -10,31 +10,20 @@ from typing import Final
 
 from app.scene.hub import BLADES, BladePose, BladeState, HubScene
 from app.service.bench import Bench
-from app.service.views import ENABLED, AxisLine, axis_lines
+from app.service.views import AxisLine, axis_lines
 
 log = logging.getLogger(__name__)
 
 PERIOD_S: Final = 1 / 30
-_STOPPED: Final = "axis_state.quick_stop_active"
-_FAULT: Final = ("axis_state.fault", "axis_state.fault_reaction_active")
+UNWATCHED_S: Final = 0.2
+"""How soon a view is noticed that somebody has opened."""
+_LOOK_AGAIN_S: Final = 0.25
+"""What is old becomes stale without anything new on the bus."""
 
 
 def pose(line: AxisLine) -> BladePose:
     """How a blade looks: its last angle, coloured by its state; grey where that is unknown or old."""
-    angle = "–" if line.position_deg is None else f"{line.position_deg:.2f}°"
-    return BladePose(line.position_deg, _look(line), f"{line.blade}   {angle}")
-
-
-def _look(line: AxisLine) -> BladeState:
-    if line.position_deg is None:
-        return BladeState.UNKNOWN
-    if line.stale:
-        return BladeState.STALE
-    if line.state in _FAULT or line.fault_code:
-        return BladeState.FAULT
-    if line.state == _STOPPED:
-        return BladeState.WARNING
-    return BladeState.ENABLED if line.state == ENABLED else BladeState.IDLE
+    return BladePose(line.position_deg, BladeState(line.look), line.demand_deg)
 
 
 @contextlib.asynccontextmanager
@@ -52,25 +41,49 @@ async def run_scene(shown: Bench | None, scene: HubScene | None) -> AsyncIterato
 
 
 async def follow(bench: Bench, scene: HubScene) -> None:
-    """Show the axes for ever, thirty times a second, and only what changed. Ends by being cancelled."""
-    before: dict[int, BladePose] = {}
+    """Show the axes for ever, thirty times a second while anybody looks. Ends by being cancelled."""
+    feed = SceneFeed(bench, scene)
     while True:
         try:
-            poses = _poses(bench)
-            changed = {blade: new for blade, new in poses.items() if before.get(blade) != new}
-            if changed:
-                scene.show(changed)
-                before |= changed
+            watched = feed.step(asyncio.get_running_loop().time())
         except Exception:  # a picture that stands still must not end the picture for good, nor pass unseen
             log.exception("the 3D view could not be updated")
-            await asyncio.sleep(1.0)
-        await asyncio.sleep(PERIOD_S)
+            watched = False
+        await asyncio.sleep(PERIOD_S if watched else UNWATCHED_S)
 
 
-def _poses(bench: Bench) -> dict[int, BladePose]:
-    """All blades now; nothing is known of any where nothing is connected."""
-    shown = bench.connection
-    if shown is None:
-        return {blade: BladePose(None, BladeState.UNKNOWN, f"{blade}   –") for blade in BLADES}
-    targets = {target.slug: target for target in shown.targets}
-    return {line.blade: pose(line) for line in axis_lines(shown.turbine, targets, shown.stamper())}
+class SceneFeed:
+    """Brings the scene up to date, step by step. For one thread; the scene must be shown by nobody else."""
+
+    def __init__(self, bench: Bench, scene: HubScene) -> None:
+        self._bench = bench
+        self._scene = scene
+        self._watched = False
+        self._seen: tuple[int, int] | None = None
+        self._looked_s = 0.0
+
+    def step(self, now_s: float) -> bool:
+        """Show what changed; ``now_s`` is a monotonic time in s. True while anybody looks.
+
+        Nothing is computed for a scene that nobody sees, nor for a live state that did not change.
+        """
+        if not self._scene.watched:
+            if self._watched:
+                self._scene.forget()
+            self._watched = False
+            return False
+        shown = self._bench.connection
+        seen = (self._bench.epoch, -1 if shown is None else shown.live.version)
+        if not self._watched or seen != self._seen or now_s - self._looked_s >= _LOOK_AGAIN_S:
+            self._watched, self._seen, self._looked_s = True, seen, now_s
+            self._scene.show(self._poses())
+        return True
+
+    def _poses(self) -> dict[int, BladePose]:
+        """All blades now; nothing is known of a blade that is not connected."""
+        poses = dict.fromkeys(BLADES, BladePose(None, BladeState.UNKNOWN))
+        shown = self._bench.connection
+        if shown is not None:
+            targets = {target.slug: target for target in shown.targets}
+            poses |= {line.blade: pose(line) for line in axis_lines(shown.turbine, targets, shown.stamper())}
+        return poses

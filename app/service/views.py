@@ -46,6 +46,7 @@ RawJson = int | float | str
 NmtName = Literal["operational", "pre-operational", "stopped", "booting", "unknown"]
 SourceName = Literal["sdo-read", "sdo-write", "pdo", "emcy"]
 SeverityName = Literal["info", "warning", "error"]
+LookName = Literal["unknown", "stale", "idle", "enabled", "warning", "fault"]
 
 _NMT: Final[Mapping[NmtState, NmtName]] = {
     NmtState.OPERATIONAL: "operational",
@@ -61,6 +62,8 @@ _SOURCE: Final[Mapping[Source, SourceName]] = {
     Source.EMCY: "emcy",
 }
 ENABLED: Final = "axis_state.operation_enabled"
+_STOPPED: Final = "axis_state.quick_stop_active"
+_FAULT: Final = ("axis_state.fault", "axis_state.fault_reaction_active")
 _COMPLAINTS: Final = ((STATUSWORD, 1 << 7, 1 << 3), (Address(0x3000), 1 << 1, 1 << 2))
 """Status objects with their bits of warning and of fault (CiA 402, statusword; OAT manual, table 11)."""
 _STATES: Final = (
@@ -106,6 +109,7 @@ class AxisLine:
     ``fault_code`` is that of the worst of ``faults``. ``demand_deg`` is None while the axis does not follow a target
     position. ``current_pct`` is in per cent of the rated current.
     ``stale``: the position is not known, older than a second, or its node is silent.
+    ``look`` sums up what a picture of the blade shows, the worst first: what is not the present, then complaints.
     """
 
     station: str
@@ -124,6 +128,7 @@ class AxisLine:
     battery_v: float | None
     dc_link_v: float | None
     stale: bool
+    look: LookName
 
 
 @dataclass(frozen=True, slots=True)
@@ -215,6 +220,7 @@ def _axis_line(station: Station, blade: int, devices: list[Target], now_ns: int)
     position = _latest(devices, _POSITION)
     state = next((axis_state(raw) for raw in _lookups(devices, STATUSWORD) if isinstance(raw, int)), None)
     faults, code = _faults(devices)
+    stale = position is None or position.stale or now_ns - position.t_ns > STALE_NS
     return AxisLine(
         station=station.slug,
         blade=blade,
@@ -231,8 +237,18 @@ def _axis_line(station: Station, blade: int, devices: list[Target], now_ns: int)
         battery_soc_pct=_number(_latest(devices, _SOC)),
         battery_v=_number(_latest(devices, _BATTERY)),
         dc_link_v=_number(_latest(devices, _DC_LINK)),
-        stale=position is None or position.stale or now_ns - position.t_ns > STALE_NS,
+        stale=stale,
+        look="unknown" if position is None else "stale" if stale else _look(state, faults),
     )
+
+
+def _look(state: str | None, faults: Iterable[FaultLine]) -> LookName:
+    severities = {fault.severity for fault in faults}
+    if state in _FAULT or "error" in severities:
+        return "fault"
+    if state == _STOPPED or "warning" in severities:
+        return "warning"
+    return "enabled" if state == ENABLED else "idle"
 
 
 def _demand(devices: list[Target], state: str | None) -> float | None:

@@ -5,11 +5,14 @@ from __future__ import annotations
 import asyncio
 import json
 from collections.abc import AsyncIterator, Iterator
+from typing import Any
 
 import httpx
+import msgspec
 import numpy as np
 import pytest
 import websockets
+import zstandard
 
 from app.scene.hub import BladePose, BladeState, HubScene
 from tests.web.rig import DEADLINE_S, Server, denied, running
@@ -99,9 +102,24 @@ async def test_large_messages_pass_to_the_3d_server_too(server: Server) -> None:
 async def test_a_pose_reaches_the_view(server: Server, scene: HubScene) -> None:
     async with server.socket("/viser", subprotocols=[PROTOCOL]) as socket, asyncio.timeout(DEADLINE_S):
         await socket.recv()
-        scene.show({2: BladePose(12.34, BladeState.ENABLED, "2   12.34° seen")})
-        while b"seen" not in bytes(await socket.recv(decode=False)):
-            pass
+        scene.show({2: BladePose(90.0, BladeState.ENABLED)})
+        turn, colour = None, None
+        while turn is None or colour is None:
+            for message in messages_of(bytes(await socket.recv(decode=False))):
+                if message.get("name") == "/rotor/blade-2/pitch" and message["type"] == "SetOrientationMessage":
+                    turn = message["wxyz"]
+                if message.get("name") == "/rotor/blade-2/pitch/blade" and "color" in message.get("updates", {}):
+                    colour = tuple(message["updates"]["color"])
+        assert turn == pytest.approx((0.5**0.5, 0.0, 0.0, -(0.5**0.5)))
+        assert colour == BladeState.ENABLED.rgb
+
+
+def messages_of(data: bytes) -> list[dict[str, Any]]:
+    """The messages of one window of the 3D server: lengths, then msgpack in zstd."""
+    whole, packed = (int.from_bytes(data[at : at + 8], "little") for at in (0, 8))
+    inner = zstandard.decompress(data[16 : 16 + packed], max_output_size=whole)
+    messages: list[dict[str, Any]] = msgspec.msgpack.decode(inner)["messages"]
+    return messages
 
 
 async def test_without_a_3d_view_its_paths_are_not_found() -> None:

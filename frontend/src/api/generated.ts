@@ -64,6 +64,30 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/favourites/{description_id}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Favourites
+         * @description The addresses that this person has marked.
+         */
+        get: operations["favourites"];
+        /**
+         * Put Favourites
+         * @description Replace the list; an address that is none is refused.
+         */
+        put: operations["put_favourites"];
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/live/backup": {
         parameters: {
             query?: never;
@@ -184,6 +208,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/live/changes-since-last-visit": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Since Last Visit
+         * @description Parameters that are not as the last visit left them; what is unknown on one side is named.
+         */
+        get: operations["since_last_visit"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/live/connect": {
         parameters: {
             query?: never;
@@ -236,6 +280,26 @@ export interface paths {
          * @description Everything that is known of a device's objects.
          */
         get: operations["description"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/live/devices/{turbine}/{station}/{device}/changes": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Parameter Changes
+         * @description The last write of each parameter; with ``address`` that parameter's writes too, newest first.
+         */
+        get: operations["parameter_changes"];
         put?: never;
         post?: never;
         delete?: never;
@@ -442,6 +506,50 @@ export interface paths {
         get: operations["turbine"];
         put?: never;
         post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/live/visit": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Present Visit
+         * @description The visit that is open.
+         */
+        get: operations["present_visit"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        /**
+         * Change Visit
+         * @description Change reason or work order of the open visit.
+         */
+        patch: operations["change_visit"];
+        trace?: never;
+    };
+    "/api/live/visit/end": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * End Visit
+         * @description Keep the values as left, end the visit, and disconnect.
+         */
+        post: operations["end_visit"];
         delete?: never;
         options?: never;
         head?: never;
@@ -1000,6 +1108,26 @@ export interface paths {
         patch: operations["change_user"];
         trace?: never;
     };
+    "/api/visits": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Visits
+         * @description Visits, newest first; of one turbine where named.
+         */
+        get: operations["visits"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
 }
 export type webhooks = Record<string, never>;
 export interface components {
@@ -1262,6 +1390,7 @@ export interface components {
             epoch: number;
             /** Turbine */
             turbine: string | null;
+            visit: components["schemas"]["VisitRef"] | null;
         };
         /**
          * BenchMessage
@@ -1426,6 +1555,60 @@ export interface components {
             name: string;
         };
         /**
+         * ChangedDevice
+         * @description One device; ``missing`` is the side on which nothing is known of it, ``replaced`` that another one answers.
+         */
+        ChangedDevice: {
+            /** Device */
+            device: string;
+            /** Missing */
+            missing: ("then" | "now") | null;
+            /** Replaced */
+            replaced: boolean;
+            /** Rows */
+            rows: components["schemas"]["ChangedValue"][];
+            /** Unknown */
+            unknown: components["schemas"]["UnknownValue"][];
+        };
+        /**
+         * ChangedValue
+         * @description A parameter that was ``was`` and is ``now``. ``person`` and ``t_ns`` are null where nobody saw the write.
+         *
+         *     ``person`` is empty where another master wrote it.
+         */
+        ChangedValue: {
+            /** Address */
+            address: string;
+            /** Name */
+            name: string;
+            /** Now Raw */
+            now_raw: number | string;
+            /** Now Shown */
+            now_shown: string;
+            /** Person */
+            person: string | null;
+            /** T Ns */
+            t_ns: number | null;
+            /** Was Raw */
+            was_raw: number | string;
+            /** Was Shown */
+            was_shown: string;
+        };
+        /**
+         * ChangesSinceLastVisit
+         * @description The values as found now beside those that the last visit left.
+         */
+        ChangesSinceLastVisit: {
+            /** Devices */
+            devices: components["schemas"]["ChangedDevice"][];
+            /**
+             * State
+             * @enum {string}
+             */
+            state: "no-earlier-visit" | "reading" | "ready";
+            visit: components["schemas"]["VisitDoc"] | null;
+        };
+        /**
          * Subscribe
          * @description What the page wants to hear; replaces what it wanted before. ``trace`` is the filter of the topic ``trace``.
          */
@@ -1587,6 +1770,14 @@ export interface components {
             severity: "warning" | "error";
             /** Text Key */
             text_key: string | null;
+        };
+        /**
+         * Favourites
+         * @description Addresses of one description in the person's own order.
+         */
+        Favourites: {
+            /** Addresses */
+            addresses: string[];
         };
         /**
          * FoundDoc
@@ -2043,6 +2234,39 @@ export interface components {
             old: string;
         };
         /**
+         * ParameterChange
+         * @description One acknowledged write, by us or by another master; ``count`` of it were folded into one.
+         */
+        ParameterChange: {
+            /** Count */
+            count: number;
+            /** Now */
+            now: string;
+            /** Person */
+            person: string;
+            /**
+             * Source
+             * @enum {string}
+             */
+            source: "ours" | "other-master";
+            /** T Ns */
+            t_ns: number;
+            /** Was */
+            was: string;
+        };
+        /**
+         * ParameterChanges
+         * @description ``last``: the last write of each parameter by address. ``history``: the writes of the one that was asked for.
+         */
+        ParameterChanges: {
+            /** History */
+            history: components["schemas"]["ParameterChange"][];
+            /** Last */
+            last: {
+                [key: string]: components["schemas"]["ParameterChange"];
+            };
+        };
+        /**
          * PlaceDoc
          * @description One kind of adapter, and how the look for it ended.
          */
@@ -2093,7 +2317,7 @@ export interface components {
         };
         /**
          * PollDevice
-         * @description What is read of one kind of device.
+         * @description What is read of one kind of device, and what usually would be.
          */
         PollDevice: {
             /** Description Id */
@@ -2103,7 +2327,7 @@ export interface components {
             /** Name */
             name: string;
             /** Usual */
-            usual: boolean;
+            usual: components["schemas"]["PollItem"][];
         };
         /**
          * PollItem
@@ -2172,6 +2396,13 @@ export interface components {
             rare_every: number;
             /** Slow Every */
             slow_every: number;
+        };
+        /**
+         * PresentVisit
+         * @description The visit that is open, or null.
+         */
+        PresentVisit: {
+            visit: components["schemas"]["VisitDoc"] | null;
         };
         /**
          * Problem
@@ -3001,6 +3232,21 @@ export interface components {
             turbine: components["schemas"]["SiteTurbineDoc"];
         };
         /**
+         * UnknownValue
+         * @description A parameter that is not known on one side: it may have changed.
+         */
+        UnknownValue: {
+            /** Address */
+            address: string;
+            /** Name */
+            name: string;
+            /**
+             * Side
+             * @enum {string}
+             */
+            side: "then" | "now";
+        };
+        /**
          * UserChange
          * @description What is to change; null stays as it is. Another password or ``disabled`` ends the user's sessions.
          */
@@ -3095,6 +3341,67 @@ export interface components {
              * @constant
              */
             v: 1;
+        };
+        /**
+         * VisitChange
+         * @description What is to change; null stays as it is.
+         */
+        VisitChange: {
+            /** Reason */
+            reason?: string | null;
+            /** Work Order */
+            work_order?: string | null;
+        };
+        /**
+         * VisitDoc
+         * @description A visit; ``ended_ns`` null: it is open. ``left_open``: nobody ended it, a later one did.
+         */
+        VisitDoc: {
+            /** Ended Ns */
+            ended_ns: number | null;
+            /** Id */
+            id: string;
+            /** Left Open */
+            left_open: boolean;
+            /** Person */
+            person: string;
+            /** Reason */
+            reason: string;
+            /** Started Ns */
+            started_ns: number;
+            /** Turbine */
+            turbine: string;
+            /** Work Order */
+            work_order: string;
+        };
+        /**
+         * VisitEnd
+         * @description Why the visit was made.
+         */
+        VisitEnd: {
+            /**
+             * Reason
+             * @default
+             */
+            reason: string;
+            /**
+             * Work Order
+             * @default
+             * @example WO-20417
+             */
+            work_order: string;
+        };
+        /**
+         * VisitRef
+         * @description The open visit; ``started_ns`` is in t_ns.
+         */
+        VisitRef: {
+            /** Id */
+            id: string;
+            /** Person */
+            person: string;
+            /** Started Ns */
+            started_ns: number;
         };
         /**
          * WriteDone
@@ -3250,6 +3557,74 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["AuditVerified"];
+                };
+            };
+            /** @description What went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                    "application/problem+json": unknown;
+                };
+            };
+        };
+    };
+    favourites: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                description_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Favourites"];
+                };
+            };
+            /** @description What went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                    "application/problem+json": unknown;
+                };
+            };
+        };
+    };
+    put_favourites: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                description_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["Favourites"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Favourites"];
                 };
             };
             /** @description What went wrong */
@@ -3454,6 +3829,36 @@ export interface operations {
             };
         };
     };
+    since_last_visit: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ChangesSinceLastVisit"];
+                };
+            };
+            /** @description What went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                    "application/problem+json": unknown;
+                };
+            };
+        };
+    };
     connect: {
         parameters: {
             query?: never;
@@ -3542,6 +3947,42 @@ export interface operations {
                     "application/json": {
                         [key: string]: unknown;
                     };
+                };
+            };
+            /** @description What went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                    "application/problem+json": unknown;
+                };
+            };
+        };
+    };
+    parameter_changes: {
+        parameters: {
+            query?: {
+                address?: string | null;
+            };
+            header?: never;
+            path: {
+                turbine: string;
+                station: string;
+                device: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ParameterChanges"];
                 };
             };
             /** @description What went wrong */
@@ -3942,6 +4383,104 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["Turbine"] | null;
+                };
+            };
+            /** @description What went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                    "application/problem+json": unknown;
+                };
+            };
+        };
+    };
+    present_visit: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["PresentVisit"];
+                };
+            };
+            /** @description What went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                    "application/problem+json": unknown;
+                };
+            };
+        };
+    };
+    change_visit: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["VisitChange"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["VisitDoc"];
+                };
+            };
+            /** @description What went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                    "application/problem+json": unknown;
+                };
+            };
+        };
+    };
+    end_visit: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["VisitEnd"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["VisitDoc"];
                 };
             };
             /** @description What went wrong */
@@ -4914,6 +5453,39 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["UserDoc"];
+                };
+            };
+            /** @description What went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                    "application/problem+json": unknown;
+                };
+            };
+        };
+    };
+    visits: {
+        parameters: {
+            query?: {
+                turbine?: string | null;
+                limit?: number;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["VisitDoc"][];
                 };
             };
             /** @description What went wrong */

@@ -1,12 +1,19 @@
 import { ActionIcon, Tooltip, useComputedColorScheme } from "@mantine/core";
-import { IconCube, IconLayoutSidebarRightCollapse, IconLayoutSidebarRightExpand } from "@tabler/icons-react";
+import {
+  IconCube,
+  IconGhost2,
+  IconLayoutSidebarRightCollapse,
+  IconLayoutSidebarRightExpand,
+  IconPlugConnectedX,
+} from "@tabler/icons-react";
 import { useEffect, useRef, useState } from "react";
 import { useTexts } from "../texts/texts";
-import classes from "./Frame.module.css";
+import classes from "./SceneDock.module.css";
+import { Labels, type LabelPlacer } from "./SceneDockLabels";
+import { Legend } from "./SceneDockLooks";
+import { CAMERAS, type CameraName, tellScene, useSceneMessages, type View } from "./sceneDockBridge";
 import { usePageSearch } from "./search";
 import { stopOnEscape } from "./stop";
-
-const PARAMETERS = "hideViserLogo";
 
 /** The 3D view, docked at the right; its page is loaded once the rest is there, and only while the dock is open. */
 export function SceneDock() {
@@ -16,7 +23,7 @@ export function SceneDock() {
   const label = t(open ? "page.scene.close" : "page.scene.open");
   return (
     <aside className={classes.scene} data-open={open} aria-label={t("page.scene.label")}>
-      <div className={classes.sceneHead}>
+      <div className={classes.head}>
         {open && (
           <>
             <IconCube size={18} aria-hidden />
@@ -46,27 +53,143 @@ export function SceneDock() {
   );
 }
 
+enum Link {
+  Loading = "loading",
+  Up = "up",
+  Lost = "lost",
+}
+
 function SceneView() {
   const t = useTexts();
-  const scheme = useComputedColorScheme();
+  const [search, update] = usePageSearch();
   const ready = useIdle();
   const frame = useRef<HTMLIFrameElement>(null);
+  const labels = useRef<LabelPlacer>(null);
+  const [link, setLink] = useState(Link.Loading);
+  const [freed, setFreed] = useState(false);
+  const view = useView();
+  // The frame gets its first view by its address; what changes later it is told, without being loaded again.
+  const [address] = useState(() => addressOf(view));
+
+  const select = (blade: number | null) => update({ blade: blade === null ? undefined : String(blade) });
+  useSceneMessages(frame, (message) => {
+    if (message.hubside === "ready") tellScene(frame.current, view);
+    else if (message.hubside === "link") setLink(message.up ? Link.Up : Link.Lost);
+    else if (message.hubside === "select") select(message.blade);
+    else if (message.hubside === "freed") setFreed(true);
+    else labels.current?.place(message);
+  });
+  useEffect(() => tellScene(frame.current, view), [view]);
+
+  const fly = (camera: CameraName) => {
+    setFreed(false);
+    tellScene(frame.current, { ...view, camera }, true);
+    update({ camera: camera === "front" ? undefined : camera });
+  };
   // The frame is of our own origin: Esc must stop there as well.
   const listen = () =>
     frame.current?.contentWindow?.addEventListener("keydown", stopOnEscape, { capture: true });
   return (
-    <div className={`${classes.sceneBody} bench`}>
-      <div className={classes.sceneWait}>{t("page.scene.loading")}</div>
-      {ready && (
-        <iframe
-          ref={frame}
-          title={t("page.scene.label")}
-          src={`/viser/?${PARAMETERS}${scheme === "dark" ? "&darkMode" : ""}`}
-          data-testid="scene"
-          onLoad={listen}
-        />
-      )}
+    <>
+      <div className={`${classes.body} bench`} data-link={link} data-theme={view.theme}>
+        {link === Link.Loading && <div className={classes.wait}>{t("page.scene.loading")}</div>}
+        {ready && (
+          <iframe
+            ref={frame}
+            title={t("page.scene.label")}
+            src={address}
+            data-testid="scene"
+            onLoad={listen}
+          />
+        )}
+        <Labels ref={labels} camera={view.camera} selected={view.selected} onSelect={select} />
+        {link === Link.Lost && <Lost />}
+      </div>
+      <div className={classes.foot}>
+        <Cameras chosen={freed ? null : view.camera} onChoose={fly} />
+        <GhostSwitch on={view.ghosts} onChange={(on) => update({ ghost: on ? undefined : "off" })} />
+      </div>
+      <Legend key={search.lang} />
+    </>
+  );
+}
+
+function useView(): View {
+  const [search] = usePageSearch();
+  const theme = useComputedColorScheme();
+  const camera = CAMERAS.find((name) => name === search.camera) ?? "front";
+  const selected = Number(search.blade ?? 0) || null;
+  const ghosts = search.ghost !== "off";
+  const [view, setView] = useState<View>({ theme, camera, selected, ghosts });
+  const same =
+    view.theme === theme && view.camera === camera && view.selected === selected && view.ghosts === ghosts;
+  if (same) return view;
+  const next = { theme, camera, selected, ghosts };
+  setView(next);
+  return next;
+}
+
+function addressOf(view: View): string {
+  return `/viser/?hideViserLogo&camera=${view.camera}${view.theme === "dark" ? "&darkMode" : ""}`;
+}
+
+function Lost() {
+  const t = useTexts();
+  return (
+    <div className={classes.lost} role="alert" data-testid="scene-lost">
+      <IconPlugConnectedX size={22} aria-hidden />
+      <strong>{t("page.scene.lost")}</strong>
+      <span>{t("page.scene.lost_explain")}</span>
     </div>
+  );
+}
+
+function Cameras({
+  chosen,
+  onChoose,
+}: {
+  chosen: CameraName | null;
+  onChoose: (camera: CameraName) => void;
+}) {
+  const t = useTexts();
+  return (
+    <div className={classes.cameras} role="group" aria-label={t("page.scene.cameras")}>
+      {CAMERAS.map((camera) => {
+        const name = t(`page.scene.camera.${camera}`);
+        const short = camera.startsWith("blade-") ? camera.slice(-1) : name;
+        return (
+          <button
+            key={camera}
+            type="button"
+            aria-label={name}
+            title={name}
+            aria-pressed={camera === chosen}
+            data-testid={`camera-${camera}`}
+            onClick={() => onChoose(camera)}
+          >
+            {short}
+          </button>
+        );
+      })}
+    </div>
+  );
+}
+
+function GhostSwitch({ on, onChange }: { on: boolean; onChange: (on: boolean) => void }) {
+  const t = useTexts();
+  const label = t("page.scene.ghosts");
+  return (
+    <Tooltip label={label}>
+      <ActionIcon
+        variant={on ? "light" : "subtle"}
+        aria-label={label}
+        aria-pressed={on}
+        data-testid="scene-ghosts"
+        onClick={() => onChange(!on)}
+      >
+        <IconGhost2 size={20} aria-hidden />
+      </ActionIcon>
+    </Tooltip>
   );
 }
 

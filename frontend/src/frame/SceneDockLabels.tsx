@@ -1,0 +1,120 @@
+import { type Ref, useImperativeHandle, useRef } from "react";
+import { useAxes } from "../live/live";
+import { figure } from "../model/values";
+import { useTexts } from "../texts/texts";
+import { LookSign } from "./SceneDockLooks";
+import classes from "./SceneDock.module.css";
+import { arranged, type CameraName, type Places } from "./sceneDockBridge";
+
+const BLADES = [1, 2, 3];
+const MARKS = [0, 90, 95];
+const FEATHER = 90;
+
+export interface LabelPlacer {
+  place: (places: Places) => void;
+}
+
+interface Props {
+  camera: CameraName;
+  selected: number | null;
+  onSelect: (blade: number | null) => void;
+  ref: Ref<LabelPlacer>;
+}
+
+/** The labels over the picture: text of the page, so that it is sharp, translated and reached by keyboard. */
+export function Labels({ camera, selected, onSelect, ref }: Props) {
+  const t = useTexts();
+  const layer = useRef<HTMLDivElement>(null);
+  const near = nearBlade(camera);
+  const shown = near === null ? BLADES : [near];
+  // Places come with every move of camera or rotor: they are set without rendering anything anew.
+  useImperativeHandle(
+    ref,
+    () => ({ place: (places) => layer.current && setPlaces(layer.current, places) }),
+    [],
+  );
+  return (
+    <div className={classes.labels} ref={layer}>
+      {shown.map((blade) => (
+        <BladeLabel
+          key={blade}
+          blade={blade}
+          place={camera === "front" ? `blade-${blade}` : `root-${blade}`}
+          selected={blade === selected}
+          onSelect={onSelect}
+        />
+      ))}
+      {near !== null &&
+        MARKS.map((degrees) => (
+          <span
+            key={degrees}
+            className={classes.mark}
+            data-place={`mark-${near}-${degrees}`}
+            data-feather={degrees === FEATHER}
+          >
+            {degrees}°{degrees === FEATHER && ` ${t("page.scene.feather")}`}
+          </span>
+        ))}
+    </div>
+  );
+}
+
+interface BladeLabelProps {
+  blade: number;
+  place: string;
+  selected: boolean;
+  onSelect: (blade: number | null) => void;
+}
+
+function BladeLabel({ blade, place, selected, onSelect }: BladeLabelProps) {
+  const t = useTexts();
+  const axis = useAxes().get(blade);
+  const look = axis?.look ?? "unknown";
+  const angle = axis?.position_deg == null ? "–" : `${figure(axis.position_deg, 2, t.language)}°`;
+  return (
+    <button
+      type="button"
+      className={classes.label}
+      data-look={look}
+      data-place={place}
+      data-blade={blade}
+      data-testid={`scene-label-${blade}`}
+      aria-pressed={selected}
+      title={t("page.scene.select", { blade })}
+      onClick={() => onSelect(selected ? null : blade)}
+    >
+      <LookSign look={look} />
+      <b>{blade}</b>
+      <span className={classes.angle}>{angle}</span>
+      <span className={classes.state}>{stateWord(t, axis?.state, look)}</span>
+    </button>
+  );
+}
+
+/** The state of the drive; what is not the present says so first. */
+function stateWord(t: ReturnType<typeof useTexts>, state: string | null | undefined, look: string): string {
+  return state == null || look === "stale" || look === "unknown" ? t(`page.look.${look}`) : t(state);
+}
+
+const nearBlade = (camera: CameraName): number | null =>
+  Number(/^blade-(\d)$/.exec(camera)?.[1] ?? 0) || null;
+
+function setPlaces(layer: HTMLElement, { places, width, height }: Places): void {
+  const byId = new Map(places.map((place) => [place.id, place]));
+  const labels = [...layer.querySelectorAll<HTMLElement>("[data-blade]")];
+  const wanted = labels.map((label) => {
+    const at = byId.get(label.dataset.place ?? "") ?? { x: width / 2, y: height / 2 };
+    return { x: at.x, y: at.y, box: { width: label.offsetWidth, height: label.offsetHeight } };
+  });
+  arranged(wanted, { width, height }).forEach((at, i) => labels[i] && moveTo(labels[i], at));
+  for (const mark of layer.querySelectorAll<HTMLElement>(`.${classes.mark}`)) {
+    const at = byId.get(mark.dataset.place ?? "");
+    mark.hidden = at?.faces !== true;
+    if (at) moveTo(mark, at);
+  }
+}
+
+function moveTo(element: HTMLElement, { x, y }: { x: number; y: number }): void {
+  element.style.transform = `translate(${x}px, ${y}px) translate(-50%, -50%)`;
+  element.dataset.placed = "true";
+}
