@@ -27,6 +27,7 @@
     │   ├── LoginError                      name or password is wrong
     │   ├── LoginPausedError                too many failed logins: wait
     │   ├── LoginNeededError                users exist, so one must log in
+    │   ├── NoVisitError                    no visit is open
     │   ├── UserUnknownError                no such user
     │   ├── UserExistsError                 the name is taken
     │   ├── UserRuleError                   a name or password that is not taken
@@ -213,6 +214,12 @@ class LoginNeededError(RefusedError):
     """Users exist, so one must log in."""
 
     code = "login_needed"
+
+
+class NoVisitError(RefusedError):
+    """No visit is open: one begins with a connection."""
+
+    code = "no_visit"
 
 
 class UserUnknownError(RefusedError):

@@ -216,6 +216,14 @@ class AuditLog:
         """Rows that fit, newest first, older than the row ``before``."""
         return await self._store.run(lambda connection: audit_rows.latest(connection, wanted, before, limit))
 
+    async def between(self, wanted: Filter, start_ns: int, end_ns: int) -> list[AuditRow]:
+        """Rows that fit with ``start_ns`` <= t_ns < ``end_ns``, oldest first."""
+        return await self._store.run(lambda connection: audit_rows.between(connection, wanted, start_ns, end_ns))
+
+    async def last_of_each_address(self, device: str, kinds: tuple[str, ...]) -> list[AuditRow]:
+        """The newest row of these kinds for every address of ``device``."""
+        return await self._store.run(lambda connection: audit_rows.last_of_each_address(connection, device, kinds))
+
     async def verify(self, expected: Head | None = None) -> Verified:
         """Walk the whole chain; ``expected`` is a head that somebody noted, which must be in it."""
         last = Head()

@@ -22,7 +22,7 @@ from app.wire.sdo import Abort
 DeviceProgress = Callable[[Target, int, int], None]
 """Called with the device, the objects done and the objects in all."""
 
-_IDENTITY: Final = {
+IDENTITY: Final = {
     "device_type": Address(0x1000),
     "device_name": Address(0x1008),
     "hardware": Address(0x1009),
@@ -95,7 +95,7 @@ def to_set(report: ReadReport, turbine: str, person: str, reason: str, wall_ns: 
     """The parameter set of a complete read."""
     target = report.target
     time = datetime.fromtimestamp(wall_ns / 1e9, UTC).isoformat(timespec="seconds").replace("+00:00", "Z")
-    found = {key: report.values.get(address) for key, address in _IDENTITY.items()}
+    found = {key: report.values.get(address) for key, address in IDENTITY.items()}
     return ParameterSet(
         description_id=target.description.id,
         description_version=target.description.version,

@@ -5,12 +5,13 @@ from __future__ import annotations
 import asyncio
 import logging
 import time
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from dataclasses import replace
 from typing import Final
 
-from app.errors import BusLostError, HubsideError, NotConnectedError
-from app.service.as_found import read_as_found, unreachable
+from app.errors import BusLostError, HubsideError, NotConnectedError, StoreError
+from app.service.as_found import REASON, read_as_found, unreachable
+from app.service.backup import to_set
 from app.service.bitrates import with_bitrates
 from app.service.connection import Connection
 from app.service.journal import Journal, Kind
@@ -22,6 +23,7 @@ from app.service.polling import Polling
 from app.service.site_edit import SiteEditor
 from app.service.sites import Sites
 from app.store.store import Store
+from app.store.visit_rows import Visit
 from app.wire.frame import Stamper
 
 log = logging.getLogger(__name__)
@@ -89,6 +91,7 @@ class Bench:
             options = replace(self.options, person=person)
             connection = Connection(found, descriptions, options, *self._clocks, self.stamper, journal)
             await connection.open(timeout_s)
+            await self._keep(self.office.visits.begin(slug, person))
             self.show(connection)
             self._look = asyncio.create_task(self._first_look(connection, person))
             return connection
@@ -115,6 +118,17 @@ class Bench:
             await self._end_look()
             self._look = asyncio.create_task(self._first_look(connection, person))
 
+    async def end_visit(self, reason: str, work_order: str, person: str) -> Visit:
+        """End the visit with the values as left, and the connection with it. Raises NoVisitError, StoreError."""
+        async with self._changing:
+            visits = self.office.visits
+            visits.require()
+            if self.connection is not None:
+                await visits.keep_left(self.connection.targets, person)
+            visit = await visits.end(reason, work_order, person)
+            await self._end(person)
+            return visit
+
     async def disconnect(self, person: str) -> None:
         """End the connection; the recording is finished. Nothing happens where there is none."""
         async with self._changing:
@@ -130,10 +144,18 @@ class Bench:
         if connection is None:
             return
         await self._end_look()
+        await self._keep(self.office.visits.keep_left(connection.targets, person))
         self.connection, self.twins = None, None
         self.epoch += 1
         self.journal.by(person).note(Kind.DISCONNECTED, None, turbine=connection.turbine.name)
         await connection.close()
+
+    async def _keep(self, keeping: Awaitable[object]) -> None:
+        """Keep something about the visit; a store that fails is told, and holds up no work at the turbine."""
+        try:
+            await keeping
+        except StoreError as error:
+            self._told(error)
 
     async def _end_look(self) -> None:
         if self._look is not None:
@@ -152,6 +174,9 @@ class Bench:
         else:
             for error in unreachable(reports).values():
                 self._told(error)
+            slug, now_ns = connection.turbine.slug, self._clocks[0]()
+            found = [to_set(report, slug, person, REASON, now_ns) for report in reports if report.values]
+            await self._keep(self.office.visits.keep_found(found))
         poller = Poller(connection, lambda: self.polling.plan)
         try:
             await asyncio.Event().wait()

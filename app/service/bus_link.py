@@ -12,6 +12,7 @@ from app.drivers.table import driver_class
 from app.model.address import Address
 from app.model.description import Bus, Description
 from app.model.site import BusConfig
+from app.service.foreign_writes import ForeignWrites
 from app.service.options import Options
 from app.service.trace_log import BusTrace
 from app.wire.busload import EXTENDED_KEY, BusLoad, LoadSecond
@@ -60,6 +61,7 @@ class BusLink:
         self.trace = BusTrace(config.name, self.decoder, lock)
         self.frames = 0
         self.sink: FrameSink | None = None
+        self.foreign: ForeignWrites | None = None
         self._live = live
         self._lock = lock
         self._state = LinkState.CLOSED
@@ -97,6 +99,8 @@ class BusLink:
             records = self.decoder.feed_all(frames)
             if records:
                 self.trace.heard(records)
+                if self.foreign is not None:
+                    self.foreign.heard(records)  # before the live state: it still knows what was there
                 self._live.apply_all(records)
 
     def gap(self, t_ns: int) -> None:

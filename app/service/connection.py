@@ -16,6 +16,7 @@ from app.recording.content import RecorderClock
 from app.recording.writer import RecorderStatus
 from app.service.bus_link import BusLink
 from app.service.devices import Target
+from app.service.foreign_writes import ForeignWrites
 from app.service.journal import Journal, Kind
 from app.service.options import Options
 from app.service.recording import Recording, Subject
@@ -56,6 +57,9 @@ class Connection:
             bus.name: BusLink(bus, self._by_node(bus.name), known, self.live, self._lock, self.stamper, options)
             for bus in turbine.buses
         }
+        self.foreign = ForeignWrites(self._targets.values(), self.journal)
+        for link in self.buses.values():
+            link.foreign = self.foreign
         self.recording: Recording | None = None
         self._states: dict[str, DriverStatus] = {}
         self._masters: set[tuple[str, MasterSign]] = set()
@@ -84,6 +88,7 @@ class Connection:
             await asyncio.gather(self._watcher, return_exceptions=True)
             self._watcher = None
         await asyncio.gather(*(link.driver.close() for link in self.buses.values()))
+        self.foreign.flush()
         if self.recording is not None:
             await asyncio.to_thread(self.recording.stop)
 
@@ -146,6 +151,7 @@ class Connection:
             self._watch(now_ns)
             with self._lock:
                 self.live.tick(now_ns)
+            self.foreign.tick(now_ns)
             if self.recording is not None:
                 self.recording.watch(self.keyframe)
             await asyncio.sleep(TICK_S)

@@ -8,11 +8,12 @@ from app.service.audit import AuditLog
 from app.service.journal import Journal
 from app.service.sessions import Sessions
 from app.service.users import Users
+from app.service.visits import Visits
 from app.store.store import Store
 
 
 class Office:
-    """Audit log, users and sessions of ``store``. ``stamp`` gives t_ns; every event of ``journal`` is audited.
+    """Audit log, users, sessions and visits of ``store``. ``stamp`` gives t_ns; every event of ``journal`` is audited.
 
     ``person`` is who a launch token lets in. Raises StoreError. Belongs to the event loop, and owns the store.
     """
@@ -22,6 +23,7 @@ class Office:
         self.audit = AuditLog(store, stamp, journal)
         self.users = Users(store, self.audit)
         self.sessions = Sessions(store, self.users, self.audit, person)
+        self.visits = Visits(store, self.audit, stamp)
         self._stop_listening = journal.listen(self.audit.take)
 
     async def close(self) -> None:

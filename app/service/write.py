@@ -81,7 +81,7 @@ async def write_raw(
     except HubsideError as error:
         journal.note(Kind.WRITE_FAILED, target.slug, **shown, reason=error.code, now=_shown(target, entry, raw))
         raise
-    journal.note(Kind.WRITTEN, target.slug, **shown, now=_shown(target, entry, raw))
+    journal.note(Kind.WRITTEN, target.slug, **shown, now=_shown(target, entry, raw), data=data.hex())
     return WriteResult(address, was, raw, read, read is not None or entry.verify is Verify.ACK, how)
 
 

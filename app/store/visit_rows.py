@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
 
-from sqlalchemy import Connection, insert, select, update
+from sqlalchemy import Connection, delete, insert, select, update
 
 from app.store.schema import visit_sets, visits
 
@@ -69,7 +69,10 @@ def open_visits(connection: Connection) -> list[Visit]:
 
 
 def keep_sets(connection: Connection, visit_id: str, phase: Phase, contents: Mapping[str, str]) -> None:
-    """Keep sets by device; those that are there already stay as they are."""
+    """Keep sets by device. As found, those that are there stay as they are; as left, they are replaced."""
+    if phase is Phase.LEFT:
+        kept = visit_sets.c.visit_id == visit_id, visit_sets.c.phase == phase.value
+        connection.execute(delete(visit_sets).where(*kept, visit_sets.c.device.in_(list(contents))))
     known = set(
         connection.scalars(
             select(visit_sets.c.device).where(visit_sets.c.visit_id == visit_id, visit_sets.c.phase == phase.value)

@@ -34,6 +34,7 @@ _STATUS: Final[tuple[tuple[type[HubsideError], HTTPStatus], ...]] = (
     (errors.UserUnknownError, HTTPStatus.NOT_FOUND),
     (errors.UserExistsError, HTTPStatus.CONFLICT),
     (errors.LastExpertError, HTTPStatus.CONFLICT),
+    (errors.NoVisitError, HTTPStatus.CONFLICT),
     (errors.RefusedError, HTTPStatus.UNPROCESSABLE_ENTITY),
     (errors.StoreError, HTTPStatus.SERVICE_UNAVAILABLE),
     (errors.UsageError, HTTPStatus.BAD_REQUEST),

@@ -51,6 +51,7 @@ from app.web.models import (
     TraceMessage,
     ValuesData,
     ValuesMessage,
+    VisitRef,
 )
 from app.wire.live import Changes
 
@@ -157,9 +158,10 @@ class Feed:
         self._trace = None
         self._start_over(frozenset({"events"} if self._told_events else ()))
         turbine = None if self._connection is None else self._connection.turbine.slug
-        return BenchMessage(
-            seq=self._count(), t_ns=self._bench.stamper(), data=BenchData(epoch=self._epoch, turbine=turbine)
-        )
+        visit = self._bench.office.visits.current
+        ref = None if visit is None else VisitRef(id=visit.id, person=visit.person, started_ns=visit.started_ns)
+        data = BenchData(epoch=self._epoch, turbine=turbine, visit=ref)
+        return BenchMessage(seq=self._count(), t_ns=self._bench.stamper(), data=data)
 
     def _changes(self) -> Changes | None:
         if self._connection is None:

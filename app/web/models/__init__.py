@@ -244,11 +244,20 @@ class LinkMessage(_Envelope):
     data: LinkLine
 
 
+class VisitRef(BaseModel):
+    """The open visit; ``started_ns`` is in t_ns."""
+
+    id: str
+    person: str
+    started_ns: int
+
+
 class BenchData(BaseModel):
     """What is connected; ``epoch`` is raised with every connection that is made or ended."""
 
     epoch: int
     turbine: str | None
+    visit: VisitRef | None
 
 
 class BenchMessage(_Envelope):

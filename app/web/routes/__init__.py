@@ -17,10 +17,11 @@ from app.web.routes import (
     trace,
     turbine,
     users,
+    visits,
     writes,
 )
 
-FEATURES = (session, turbine, devices, jobs, stop, writes, recordings, sets, users, audit, settings, trace)
+FEATURES = (session, turbine, devices, jobs, stop, writes, recordings, sets, users, audit, visits, settings, trace)
 
 
 def api_router() -> APIRouter:
