@@ -16,6 +16,13 @@ export function timeOfDay(ms: number, decimals: 0 | 3 = 3): string {
   return decimals === 0 ? plain : `${plain}.${String(at.getMilliseconds()).padStart(3, "0")}`;
 }
 
+/** `2026-11-22 14:03` of a moment, in the local time of the browser. */
+export function dateAndTime(ms: number): string {
+  const at = new Date(ms);
+  const day = `${at.getFullYear()}-${two(at.getMonth() + 1)}-${two(at.getDate())}`;
+  return `${day} ${two(at.getHours())}:${two(at.getMinutes())}`;
+}
+
 /** `0.3 s`, `45 s`, `12 min`, `3.2 h` of an age. */
 export function age(ageMs: number, language: Language): string {
   const seconds = Math.max(0, ageMs / 1000);
@@ -37,4 +44,18 @@ export function errorCode(code: number): string {
 /** `wtg-07/blade-2/pmc` without the turbine, as people say it: the names of station and device. */
 export function lastOf(slug: string): string {
   return slug.split("/").slice(1).join(" ");
+}
+
+/** `2026-11-22 04:31:26` of a moment, in the local time of the browser: sorts as it reads, the same in every language. */
+export function dayAndTime(ms: number): string {
+  const at = new Date(ms);
+  return `${at.getFullYear()}-${two(at.getMonth() + 1)}-${two(at.getDate())} ${timeOfDay(ms, 0)}`;
+}
+
+/** Bytes in the unit that reads best: `512 B`, `6.1 kB`, `41.3 MB`, `1.2 GB`. */
+export function bytes(count: number, language: Language): string {
+  if (count < 1000) return `${count} B`;
+  if (count < 1e6) return `${figure(count / 1e3, 1, language)} kB`;
+  if (count < 1e9) return megabytes(count, language);
+  return `${figure(count / 1e9, 1, language)} GB`;
 }

@@ -94,7 +94,7 @@ function FindingLine({ finding }: { finding: Finding }) {
         <Link
           to="/parameters"
           search={(before: PageSearch) =>
-            readSearch({ ...before, q: undefined, only: undefined, device, ...more })
+            readSearch({ ...before, q: undefined, only: undefined, view: undefined, device, ...more })
           }
         >
           {t("page.rooms.parameters")} <IconArrowRight size={15} aria-hidden />

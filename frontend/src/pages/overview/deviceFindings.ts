@@ -4,6 +4,7 @@ import type { Cell } from "../../live/store";
 import { type DeviceContext, lineOf, shownOf } from "../../model/shown";
 import { differsFromDefault, isUnsaved, rawOf } from "../parameters/cellValue";
 import { entriesOf } from "../../ui/reading";
+import type { PageSearch } from "../../frame/search";
 import type { Finding } from "./attention";
 import {
   BLOC_COUNT,
@@ -115,7 +116,7 @@ function unsavedFindings(watched: Watched): Finding[] {
     isUnsaved(entry, watched.cells.get(entry.address)),
   );
   if (entries.length === 0) return [];
-  const q = entries.length === 1 ? { q: entries[0]?.address ?? "" } : { only: "changed" as const };
+  const q = entries.length === 1 ? { q: entries[0]?.address ?? "" } : { only: "changed" };
   return [finding(watched, "warning", "unsaved", { count: entries.length }, q)];
 }
 
@@ -141,7 +142,8 @@ function parityFindings(devices: readonly Watched[]): Finding[] {
     if (!first || addresses.length === 0) return [];
     const named = addresses.slice(0, 3).join(", ");
     const details = { name: first.context.doc.name, count: addresses.length, named };
-    const q = addresses.length === 1 ? { q: addresses[0] ?? "" } : {};
+    const q: PageSearch = addresses.length === 1 ? { q: addresses[0] ?? "" } : { only: "different" };
+    q.view = "side";
     return [finding(first, "info", addresses.length > 3 ? "parity_many" : "parity", details, q)];
   });
 }
