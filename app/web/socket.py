@@ -61,6 +61,7 @@ TICK_S: Final = 0.01
 """Window in which changes are collected: the most that a change waits here."""
 HEARTBEAT_S: Final = 0.25
 AXES_S: Final = 0.02
+AXES_LOOK_AGAIN_S: Final = 0.2
 AXES_AT_LEAST_S: Final = 1.0
 NODES_S: Final = 0.25
 LINK_S: Final = 1.0
@@ -92,6 +93,7 @@ class Feed:
         self._stop_listening = bench.journal.listen(self._journal.append)
         self._link: LinkLine | None = None
         self._axes: tuple[AxisLine, ...] = ()
+        self._axes_cursor = -1
         self._nodes_urgent: tuple[Any, ...] = ()
         self._nodes_changed = False
         self._told_events = False
@@ -196,8 +198,12 @@ class Feed:
             yield NodesMessage(seq=self._count(), t_ns=self._bench.stamper(), data=lines)
 
     def _axes_due(self, now_s: float) -> Iterator[ServerMessage]:
-        if not self._passed("axes", now_s, AXES_S):
+        changed = self._cursor != self._axes_cursor or "axes" in self._fresh
+        # Where nothing changed nothing is computed anew, but for looking now and then: values also grow old.
+        what, period_s = ("axes", AXES_S) if changed else ("old axes", AXES_LOOK_AGAIN_S)
+        if not self._passed(what, now_s, period_s):
             return
+        self._axes_cursor = self._cursor
         now_ns = self._bench.stamper()
         turbine = None if self._connection is None else self._connection.turbine
         lines = () if turbine is None else axis_lines(turbine, self._targets, now_ns)
