@@ -87,6 +87,13 @@ export class FrameStore {
     this.change({ newer: true });
   }
 
+  /** Go on with nothing: what came meanwhile is fetched by who shows it. */
+  resume(): void {
+    this.paused = false;
+    this.pausedAt = null;
+    this.change({ rows: [], arrived: 0, older: true, newer: false, reachedNs: null, source: null });
+  }
+
   take(batch: TraceBatch, nowMs: number): void {
     if (batch.id !== this.id) return;
     // Another start: the server has begun anew, with another connection.
@@ -136,7 +143,9 @@ export class FrameStore {
   }
 
   private appended(rows: readonly TraceLine[]): readonly TraceLine[] {
-    const all = [...this.view.rows, ...rows];
+    // A page that was fetched meanwhile may hold the first of them already.
+    const last = this.view.rows.at(-1)?.t_ns ?? 0;
+    const all = [...this.view.rows, ...rows.filter((row) => row.t_ns > last)];
     return all.length > MAX_ROWS ? all.slice(-MAX_ROWS) : all;
   }
 

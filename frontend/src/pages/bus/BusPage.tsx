@@ -1,6 +1,57 @@
+import { Tabs } from "@mantine/core";
+import { usePageSearch } from "../../frame/search";
+import { useBench } from "../../live/live";
 import { useTexts } from "../../texts/texts";
+import classes from "./Bus.module.css";
+import { EmcyLog } from "./EmcyLog";
+import { IdentifierTable } from "./IdentifierTable";
+import { LoadView } from "./LoadView";
+import { NodeTable } from "./NodeTable";
+import { SdoLog } from "./SdoLog";
+import { TraceView } from "./TraceView";
 
+const VIEWS = {
+  trace: TraceView,
+  ids: IdentifierTable,
+  nodes: NodeTable,
+  sdo: SdoLog,
+  emcy: EmcyLog,
+  load: LoadView,
+};
+type ViewName = keyof typeof VIEWS;
+
+const isView = (name: string | undefined | null): name is ViewName => name != null && name in VIEWS;
+
+/** Everything that crosses the bus: frame by frame, and in tables. */
 export function BusPage() {
   const t = useTexts();
-  return <h1>{t("page.rooms.bus")}</h1>;
+  const [search, update] = usePageSearch();
+  const bench = useBench();
+  const name: ViewName = isView(search.tab) ? search.tab : "trace";
+  const View = VIEWS[name];
+  return (
+    <div className={classes.page}>
+      <Tabs
+        value={name}
+        onChange={(to) => update({ tab: isView(to) && to !== "trace" ? to : undefined })}
+        aria-label={t("trace.tab.label")}
+      >
+        <Tabs.List>
+          {Object.keys(VIEWS).map((one) => (
+            <Tabs.Tab key={one} value={one} h={40} data-testid={`tab-${one}`}>
+              {t(`trace.tab.${one}`)}
+            </Tabs.Tab>
+          ))}
+        </Tabs.List>
+      </Tabs>
+      {bench?.turbine === null ? (
+        <div className={classes.nothing}>
+          <strong>{t("trace.page.disconnected")}</strong>
+          <p>{t("trace.page.disconnected_next")}</p>
+        </div>
+      ) : (
+        <View />
+      )}
+    </div>
+  );
 }

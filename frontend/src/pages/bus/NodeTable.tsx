@@ -1,0 +1,120 @@
+import { useQuery } from "@tanstack/react-query";
+import { IconAlertTriangle } from "@tabler/icons-react";
+import { useMemo } from "react";
+import { type BusNode, nodesQuery } from "../../api/trace";
+import { usePageSearch } from "../../frame/search";
+import { useServerNow } from "../../live/live";
+import { figure } from "../../model/values";
+import { useTexts } from "../../texts/texts";
+import { useDeviceName } from "../../ui/devices";
+import { age } from "../../ui/format";
+import { type DataColumn, DataTable } from "./DataTable";
+import { Share } from "./Share";
+
+const NOW_MS = 500;
+const LATE_FACTOR = 1.5;
+
+/** Every node that was seen or that the site names: state, heartbeat and its age, load, emergencies, SDO. */
+export function NodeTable() {
+  const t = useTexts();
+  const [, update] = usePageSearch();
+  const nameOf = useDeviceName();
+  const rows = useQuery(nodesQuery).data ?? [];
+  const nowMs = useServerNow(NOW_MS);
+  const most = Math.max(...rows.map((row) => row.load), 0.001);
+  const columns = useMemo((): DataColumn<BusNode>[] => {
+    const agoOf = (tNs: number) => age(nowMs - tNs / 1e6, t.language);
+    const stateOf = (row: BusNode) =>
+      !row.seen
+        ? t("trace.table.not_seen")
+        : row.silent
+          ? t("trace.table.silent")
+          : row.nmt === null
+            ? "–"
+            : t(row.nmt);
+    const heartbeatOf = (row: BusNode) => {
+      if (row.heartbeat_t_ns === null) return "–";
+      const period =
+        row.period_ms === null
+          ? ""
+          : ` · ${t("trace.table.period", { period: figure(row.period_ms, 0, t.language) })}`;
+      return `${agoOf(row.heartbeat_t_ns)}${period}`;
+    };
+    const late = (row: BusNode) =>
+      row.heartbeat_t_ns !== null &&
+      row.period_ms !== null &&
+      nowMs - row.heartbeat_t_ns / 1e6 > row.period_ms * LATE_FACTOR + NOW_MS;
+    const emcyOf = (row: BusNode) =>
+      row.emcy === null || row.emcy_t_ns === null
+        ? "–"
+        : row.emcy.reset === true
+          ? `${t("trace.table.reset")} · ${agoOf(row.emcy_t_ns)}`
+          : `${t("trace.note.abort", row.emcy)} · ${agoOf(row.emcy_t_ns)}`;
+    const sdoOf = (row: BusNode) =>
+      [
+        t("trace.table.transfers", { count: row.sdo_count }),
+        row.other_client_t_ns === null
+          ? ""
+          : t("trace.table.other_client", { age: agoOf(row.other_client_t_ns) }),
+      ]
+        .filter(Boolean)
+        .join(" · ");
+    return [
+      { id: "node", width: "62px", text: (row) => String(row.node), order: (row) => row.node },
+      {
+        id: "device",
+        width: "minmax(120px, 1.2fr)",
+        text: (row) => (row.device === null ? t("trace.table.foreign") : nameOf(row.device)),
+      },
+      { id: "name", width: "minmax(110px, 1.3fr)", text: (row) => row.device_name ?? "–" },
+      {
+        id: "nmt",
+        width: "140px",
+        text: stateOf,
+        show: (row) => (
+          <span
+            className={
+              row.silent || !row.seen ? "tone-error" : row.nmt === "nmt.state.operational" ? "tone-ok" : ""
+            }
+          >
+            {(row.silent || !row.seen) && <IconAlertTriangle size={13} aria-hidden />} {stateOf(row)}
+          </span>
+        ),
+      },
+      {
+        id: "heartbeat",
+        width: "160px",
+        text: heartbeatOf,
+        order: (row) => -(row.heartbeat_t_ns ?? 0),
+        show: (row) => (
+          <span className={late(row) ? "tone-warning" : ""}>
+            {heartbeatOf(row)}
+            {late(row) && ` · ${t("trace.table.late")}`}
+          </span>
+        ),
+      },
+      { id: "boots", width: "62px", text: (row) => String(row.boots), order: (row) => row.boots },
+      {
+        id: "share",
+        width: "120px",
+        text: (row) => `${figure(row.load * 100, 2, t.language)} %`,
+        order: (row) => row.load,
+        show: (row) => (
+          <Share share={row.load} most={most} text={`${figure(row.load * 100, 2, t.language)} %`} />
+        ),
+      },
+      { id: "emcy", width: "minmax(140px, 1.6fr)", text: emcyOf, order: (row) => -(row.emcy_t_ns ?? 0) },
+      { id: "sdo", width: "minmax(120px, 1fr)", text: sdoOf, order: (row) => row.sdo_count },
+    ];
+  }, [t, nameOf, nowMs, most]);
+  return (
+    <DataTable
+      name="nodes"
+      rows={rows}
+      columns={columns}
+      keyOf={(row) => `${row.bus}-${String(row.node)}`}
+      tone={(row) => (row.silent ? "error" : "plain")}
+      onOpen={(row) => update({ tab: undefined, q: undefined, sort: undefined, nodes: String(row.node) })}
+    />
+  );
+}

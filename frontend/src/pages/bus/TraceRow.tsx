@@ -1,0 +1,104 @@
+import { IconAlertOctagon, IconAlertTriangle, IconArrowLeft, IconArrowRight } from "@tabler/icons-react";
+import { memo } from "react";
+import type { TraceItem, TraceLine } from "../../api/trace";
+import { type Translate, useTexts } from "../../texts/texts";
+import { useDeviceName } from "../../ui/devices";
+import { timeOfDay } from "../../ui/format";
+import classes from "./Bus.module.css";
+import { bytesOf, idText, noteTexts, objectName, serviceText, valueText } from "./lines";
+
+interface Props {
+  line: TraceLine;
+  top: number;
+  index: number;
+  picked: boolean;
+  query: string;
+  onPick: (tNs: number) => void;
+}
+
+/** One frame, 21 px high: when, which way, whose, what it carried and what that means. */
+export const TraceRow = memo(function TraceRow({ line, top, index, picked, query, onPick }: Props) {
+  const t = useTexts();
+  const nameOf = useDeviceName();
+  const gap = line.service === "gap";
+  const Arrow = line.direction === "tx" ? IconArrowRight : IconArrowLeft;
+  return (
+    <div
+      role="row"
+      aria-rowindex={index + 2}
+      aria-selected={picked}
+      className={classes.traceRow}
+      data-tone={line.tone}
+      data-service={line.service}
+      data-picked={picked}
+      data-testid="trace-row"
+      data-t={String(line.t_ns)}
+      style={{ transform: `translateY(${String(top)}px)` }}
+      onClick={() => onPick(line.t_ns)}
+    >
+      <span role="gridcell">{timeOfDay(line.t_ns / 1e6)}</span>
+      <span role="gridcell" data-direction={line.direction}>
+        {!gap && <Arrow size={12} aria-hidden />}
+        {gap ? "" : line.direction}
+      </span>
+      <span role="gridcell">{gap ? "" : idText(line)}</span>
+      <span role="gridcell" className={classes.clip}>
+        {line.node > 0 && <b>{line.node}</b>} {line.device === null ? "" : nameOf(line.device)}
+      </span>
+      <span role="gridcell" className={classes.clip}>
+        {serviceText(line, t)}
+      </span>
+      <b role="gridcell" className={classes.bytes}>
+        {line.remote ? "RTR" : bytesOf(line.data).join(" ")}
+      </b>
+      <span role="gridcell" className={classes.meaning}>
+        <Meaning line={line} query={query} t={t} />
+      </span>
+    </div>
+  );
+});
+
+function Meaning({ line, query, t }: { line: TraceLine; query: string; t: Translate }) {
+  const Sign = line.tone === "error" ? IconAlertOctagon : line.tone === "warning" ? IconAlertTriangle : null;
+  return (
+    <>
+      {Sign && <Sign size={13} aria-hidden />}
+      {line.step !== null && <i>{t(`trace.step.${line.step}`)}</i>}
+      {line.items.map((item, at) => (
+        <Item key={`${item.address}-${String(at)}`} item={item} query={query} t={t} />
+      ))}
+      {noteTexts(line, t).map((note) => (
+        <em key={note}>
+          <Marked text={note} query={query} />
+        </em>
+      ))}
+    </>
+  );
+}
+
+function Item({ item, query, t }: { item: TraceItem; query: string; t: Translate }) {
+  return (
+    <span>
+      <code>
+        <Marked text={item.address} query={query} />
+      </code>{" "}
+      <Marked text={objectName(item, t)} query={query} />
+      {item.text !== null && <b> {valueText(item, t)}</b>}
+    </span>
+  );
+}
+
+/** The text with every place marked that the search found. */
+export function Marked({ text, query }: { text: string; query: string }) {
+  const wanted = query.trim().toLowerCase();
+  const at = wanted === "" ? -1 : text.toLowerCase().indexOf(wanted);
+  if (at < 0) return text;
+  const end = at + wanted.length;
+  return (
+    <>
+      {text.slice(0, at)}
+      <mark>{text.slice(at, end)}</mark>
+      <Marked text={text.slice(end)} query={query} />
+    </>
+  );
+}

@@ -1,0 +1,76 @@
+/** Rows of the trace in words: what stands in the table, in the detail and in the file. */
+import type { TraceItem, TraceLine } from "../../api/trace";
+import { localise } from "../../model/values";
+import type { Translate } from "../../texts/texts";
+import { timeOfDay } from "../../ui/format";
+
+const NUMBER = /^-?\d+\.\d+$/;
+
+export const idText = (line: Pick<TraceLine, "can_id" | "extended">): string =>
+  line.can_id
+    .toString(16)
+    .toUpperCase()
+    .padStart(line.extended ? 8 : 3, "0");
+
+export const bytesOf = (hex: string): string[] => hex.toUpperCase().match(/../g) ?? [];
+
+/** `TPDO2`, `SDO req`, `Heartbeat`. */
+export function serviceText(line: Pick<TraceLine, "service" | "number">, t: Translate): string {
+  const name = t(`trace.service.${line.service}`);
+  return line.number > 0 ? `${name}${String(line.number)}` : name;
+}
+
+export function objectName(item: TraceItem, t: Translate): string {
+  if (item.name === null) return "";
+  const name = t.nameOf(item.name);
+  return item.sub === null ? name : `${name}: ${t.nameOf(item.sub)}`;
+}
+
+/** `49.0 °C`, `0637h`, `Profile position (1)`; empty where the row only names the object. */
+export function valueText(item: TraceItem, t: Translate): string {
+  if (item.text === null) return "";
+  if (item.key !== null) return `${t(item.key)} (${item.text})`;
+  const text = NUMBER.test(item.text) ? localise(item.text, t.language) : item.text;
+  return item.unit === "" ? text : `${text} ${item.unit}`;
+}
+
+export function noteTexts(line: TraceLine, t: Translate): string[] {
+  return line.notes.map((note) => t(note.key, note.details));
+}
+
+/** All that a row means, as one text. */
+export function meaningText(line: TraceLine, t: Translate): string {
+  const step = line.step === null ? [] : [t(`trace.step.${line.step}`)];
+  const items = line.items.map((item) =>
+    [item.address, objectName(item, t), item.text === null ? "" : `= ${valueText(item, t)}`]
+      .filter(Boolean)
+      .join(" "),
+  );
+  return [...step, ...items, ...noteTexts(line, t)].join(" · ");
+}
+
+/** The row of the request, or of the answer, with which this one makes a transfer. */
+export function partnerOf(line: TraceLine, rows: readonly TraceLine[]): TraceLine | undefined {
+  if (line.start_t_ns !== null && line.start_t_ns !== line.t_ns)
+    return rows.find((row) => row.t_ns === line.start_t_ns && row.bus === line.bus);
+  return rows.find(
+    (row) => row.start_t_ns === line.t_ns && row.bus === line.bus && row.node === line.node && row !== line,
+  );
+}
+
+export function table(rows: readonly TraceLine[], t: Translate): string[][] {
+  const heads = ["time", "direction", "id", "node", "service", "data", "meaning"];
+  return [
+    ["t_ns", ...heads.map((head) => t(`trace.column.${head}`))],
+    ...rows.map((row) => [
+      BigInt(row.t_ns).toString(),
+      timeOfDay(row.t_ns / 1e6),
+      row.direction,
+      idText(row),
+      row.node === 0 ? "" : String(row.node),
+      serviceText(row, t),
+      bytesOf(row.data).join(" "),
+      meaningText(row, t),
+    ]),
+  ];
+}

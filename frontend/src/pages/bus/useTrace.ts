@@ -1,0 +1,87 @@
+/** Keeps the trace of the room running by the filter in the URL, and fetches what lies outside of it. */
+import { useMutation } from "@tanstack/react-query";
+import { useCallback, useEffect, useMemo, useRef } from "react";
+import { fetchFrames, type Side, type TraceFilter } from "../../api/trace";
+import { usePageSearch } from "../../frame/search";
+import { frames, store, useBench, useFrames, watchTrace } from "../../live/live";
+import { notify } from "../../ui/notices";
+import { storyOf } from "../../ui/problem";
+import { useTexts } from "../../texts/texts";
+import { filterOf } from "./filter";
+
+const PAGE_ROWS = 300;
+/** More than the clocks of page and server differ by. */
+const AHEAD_MS = 1000;
+const WHERE = { before: "before", after: "after", around: "instead" } as const;
+
+interface Ask {
+  side: Side;
+  tNs: number;
+}
+
+export function useTrace() {
+  const t = useTexts();
+  const [search, update] = usePageSearch();
+  const view = useFrames();
+  const epoch = useBench()?.epoch;
+  const { nodes, services, dir, ids, data, q, errors } = search;
+  const key = JSON.stringify(filterOf({ nodes, services, dir, ids, data, q, errors } as typeof search));
+  const filter = useMemo(() => JSON.parse(key) as TraceFilter, [key]);
+  const wanted = Number(search.frame ?? NaN);
+  const paused = search.paused !== undefined || Number.isFinite(wanted);
+
+  const { mutate, isPending } = useMutation({
+    mutationFn: ({ side, tNs }: Ask) => fetchFrames(side, tNs, filter, PAGE_ROWS),
+    onSuccess: (page, { side }) => frames.merge(page, WHERE[side]),
+    onError: (error) => {
+      const story = storyOf(error, t);
+      notify({ tone: "error", title: t("trace.page.failed"), lines: [story.happened, story.next] });
+    },
+  });
+
+  useEffect(() => {
+    const at = new URLSearchParams(location.search);
+    return watchTrace(filter, frames.begin(at.has("paused") || at.has("frame")));
+  }, [filter, epoch]);
+
+  // What came before the running trace began, once, exactly up to its first frame; or the moment that is asked for.
+  const { startNs } = view;
+  const asked = useRef<number | null>(null);
+  useEffect(() => {
+    if (startNs === null || asked.current === startNs) return;
+    asked.current = startNs;
+    const at = Number(new URLSearchParams(location.search).get("frame") ?? NaN);
+    if (Number.isFinite(at)) mutate({ side: "around", tNs: at });
+    else mutate({ side: "before", tNs: startNs });
+  }, [startNs, mutate]);
+
+  // A frame that is not among the rows is fetched with what stands around it.
+  useEffect(() => {
+    if (!Number.isFinite(wanted) || startNs === null) return;
+    if (!frames.view.rows.some((row) => row.t_ns === wanted)) mutate({ side: "around", tNs: wanted });
+  }, [wanted, startNs, mutate]);
+
+  const pause = useCallback(() => {
+    frames.pause();
+    update({ paused: "1" });
+  }, [update]);
+  const resume = useCallback(() => {
+    update({ paused: undefined, frame: undefined });
+    frames.resume();
+    mutate({ side: "before", tNs: Math.ceil((store.serverNowMs() + AHEAD_MS) * 1e6) });
+  }, [mutate, update]);
+
+  const edge = (side: Side, tNs: number | undefined) => {
+    if (tNs !== undefined && !isPending) mutate({ side, tNs });
+  };
+  return {
+    view,
+    paused,
+    pause,
+    resume,
+    fetching: isPending,
+    older: () => edge("before", view.reachedNs ?? view.rows[0]?.t_ns ?? startNs ?? undefined),
+    newer: () => edge("after", view.rows.at(-1)?.t_ns),
+    wanted: Number.isFinite(wanted) ? wanted : null,
+  };
+}
