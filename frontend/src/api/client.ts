@@ -100,5 +100,6 @@ export const commands = {
   consent: () => post<object>("/api/live/consent", {}),
   stop: () => post<StopResult>("/api/live/stop", {}),
   feather: () => post<StopResult>("/api/live/feather", {}),
+  backup: (reason: string) => post<Job>("/api/live/backup", { reason }),
   cancel: (id: string) => request<Job>(`/api/live/jobs/${id}`, { method: "DELETE" }),
 };

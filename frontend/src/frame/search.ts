@@ -41,6 +41,8 @@ export interface PageSearch {
   find?: string;
   order?: string;
   less?: string;
+  /** "different" shows of a set only what differs from the device now. */
+  compare?: "different";
   /** The procedure that is open. */
   procedure?: string;
   /** Filter and least severity of the event drawer, and its height in pixels. */
@@ -105,6 +107,7 @@ export function readSearch(raw: Record<string, unknown>): PageSearch {
   if (raw.theme === "dark" || raw.theme === "light") search.theme = raw.theme;
   if (raw.scene === "off") search.scene = raw.scene;
   if (raw.ghost === "off") search.ghost = raw.ghost;
+  if (raw.compare === "different") search.compare = raw.compare;
   if (raw.events === "open") search.events = raw.events;
   if (raw.view === "side") search.view = raw.view;
   if (raw.review === "open") search.review = raw.review;

@@ -46,14 +46,20 @@ interface Props<Row> {
   onOpen?: (row: Row) => void;
   selected?: string | undefined;
   tools?: ReactNode;
+  /** Columns that are hidden until somebody chooses. */
+  hiddenFirst?: readonly string[];
 }
+
+const NONE = "none";
+/** Below this width of a column the table is scrolled sideways. */
+const COLUMN_PX = 88;
 
 /** A table with filter, order, choice of columns, copy, export and keyboard; only the rows in view are drawn. */
 export function DataTable<Row>(props: Props<Row>) {
-  const { label, rows, columns, idOf, fileName, empty, onOpen, selected, tools } = props;
+  const { label, rows, columns, idOf, fileName, empty, onOpen, selected, tools, hiddenFirst = [] } = props;
   const t = useTexts();
   const [search, update] = usePageSearch();
-  const hidden = search.less?.split(",") ?? [];
+  const hidden = search.less?.split(",") ?? hiddenFirst;
   const shown = columns.filter((column) => column.fixed === true || !hidden.includes(column.id));
   const found = useMemo(
     () => arranged(rows, columns, search.find ?? "", search.order),
@@ -91,19 +97,21 @@ export function DataTable<Row>(props: Props<Row>) {
         {tools}
       </div>
       <div role="table" aria-label={label} aria-rowcount={found.length + 1} className={classes.grid}>
-        <Head columns={shown} tracks={tracks} />
-        {found.length === 0 ? (
-          <div className={classes.empty}>{rows.length === 0 ? empty : t("page.files.none_match")}</div>
-        ) : (
-          <Body
-            rows={found}
-            columns={shown}
-            tracks={tracks}
-            idOf={idOf}
-            onOpen={onOpen}
-            selected={selected}
-          />
-        )}
+        <div className={classes.wide} style={{ minWidth: shown.length * COLUMN_PX }}>
+          <Head columns={shown} tracks={tracks} />
+          {found.length === 0 ? (
+            <div className={classes.empty}>{rows.length === 0 ? empty : t("page.files.none_match")}</div>
+          ) : (
+            <Body
+              rows={found}
+              columns={shown}
+              tracks={tracks}
+              idOf={idOf}
+              onOpen={onOpen}
+              selected={selected}
+            />
+          )}
+        </div>
       </div>
     </section>
   );
@@ -228,7 +236,7 @@ function ColumnMenu<Row>({ columns, hidden, texts, fileName }: ColumnMenuProps<R
   const [, update] = usePageSearch();
   const toggle = (id: string) => {
     const less = hidden.includes(id) ? hidden.filter((one) => one !== id) : [...hidden, id];
-    update({ less: less.length === 0 ? undefined : less.join() });
+    update({ less: less.length === 0 ? NONE : less.filter((one) => one !== NONE).join() });
   };
   const copy = () => {
     const lines = texts();

@@ -30,7 +30,7 @@ export function RecordingsPage() {
   const link = useLink();
   const [search, update] = usePageSearch();
   const columns = useMemo(() => columnsOf(t, link), [t, link]);
-  const files = list.data?.files ?? [];
+  const files = useMemo(() => latestFirst(list.data?.files ?? [], link), [list.data, link]);
   const opened = files.find((file) => file.name === search.file);
   return (
     <div className={room.room}>
@@ -57,6 +57,7 @@ export function RecordingsPage() {
         empty={t(list.isPending ? "page.loading" : "page.recordings.none")}
         onOpen={(file) => update({ file: file.name })}
         selected={search.file}
+        hiddenFirst={HIDDEN_FIRST}
       />
       {opened && <RecordingDetails file={opened} />}
       {search.file !== undefined && list.isSuccess && !opened && (
@@ -91,7 +92,7 @@ function Running({ link }: { link: LinkData | null }) {
 }
 
 const STATE_LOOKS = {
-  live: { Icon: IconCircleFilled, tone: "tone-error" },
+  live: { Icon: IconCircleFilled, tone: "tone-ok" },
   finished: { Icon: IconCircleCheck, tone: "" },
   unfinished: { Icon: IconAlertTriangle, tone: "tone-warning" },
   unreadable: { Icon: IconFileAlert, tone: "tone-error" },
@@ -125,6 +126,15 @@ function factsOf(file: RecordingRef, link: LinkData | null) {
   };
 }
 
+const HIDDEN_FIRST = ["events", "file"];
+
+/** The running one first, then by when they were begun: a copied file is not a new one. */
+function latestFirst(files: readonly RecordingRef[], link: LinkData | null): RecordingRef[] {
+  const begun = (file: RecordingRef) =>
+    file.state === "live" ? Infinity : (factsOf(file, link).startedMs ?? file.modified_ns / 1e6);
+  return files.toSorted((a, b) => begun(b) - begun(a));
+}
+
 const orDash = (text: string | null | undefined) => (text == null || text === "" ? "–" : text);
 
 function columnsOf(t: Translate, link: LinkData | null): TableColumn<RecordingRef>[] {
@@ -144,7 +154,7 @@ function columnsOf(t: Translate, link: LinkData | null): TableColumn<RecordingRe
     {
       id: "started",
       title: title("started"),
-      width: "minmax(142px, 1fr)",
+      width: "minmax(152px, 1fr)",
       fixed: true,
       text: (file) => dayAndTime(facts(file).startedMs ?? file.modified_ns / 1e6),
       by: (file) => facts(file).startedMs ?? file.modified_ns / 1e6,
@@ -179,7 +189,7 @@ function columnsOf(t: Translate, link: LinkData | null): TableColumn<RecordingRe
     {
       id: "lost",
       title: title("lost"),
-      width: "64px",
+      width: "58px",
       numeric,
       text: (file) => count(facts(file).lost),
       by: (file) => facts(file).lost,
@@ -191,7 +201,7 @@ function columnsOf(t: Translate, link: LinkData | null): TableColumn<RecordingRe
     {
       id: "events",
       title: title("events"),
-      width: "64px",
+      width: "58px",
       numeric,
       text: (file) => count(facts(file).events),
       by: (file) => facts(file).events,
