@@ -28,6 +28,9 @@ COMMANDS: Final = {
     "recordings": ("export", "recover"),
     "serve": ("serve",),
     "demo": ("demo",),
+    "users": ("users",),
+    "audit": ("audit",),
+    "store": ("store",),
 }
 """Modules of this package, each with ``add_parser``, and the commands that it adds."""
 

@@ -8,23 +8,44 @@ import secrets
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
+from app.errors import UsageError
 from app.scene.hub import HubScene
 from app.service.bench import Bench
 from app.web.access import Access
 from app.web.app import create_app
-from app.web.serve import launch_url, open_port, port_of, serve
+from app.web.listen import Listen, Tls, parse_listen
+from app.web.serve import open_port, port_of, serve
 
 
 @asynccontextmanager
 async def serve_page(arguments: argparse.Namespace, bench: Bench) -> AsyncIterator[str]:
-    """Serve the page while the block runs; gives the address to open. Raises UsageError where the port is taken."""
-    listener = open_port(arguments.port)
+    """Serve the page while the block runs; gives the address to open. Raises UsageError where it cannot be served.
+
+    The address holds a launch token while there are no users.
+    """
+    listen = listen_of(arguments)
+    sessions = bench.office.sessions
+    listen.check(sessions.login_needed)
+    listener = open_port(listen.port, str(listen.address))
     at = port_of(listener)
-    access = Access(bench.office.sessions, at)
+    reach = listen.reach(at)
+    access = Access(sessions, at, reach.secure)
     scene = await asyncio.to_thread(HubScene, secrets.token_urlsafe(32))
     try:
-        application = create_app(bench, access, at, scene, arguments.settings.language)
-        async with serve(application, listener):
-            yield launch_url(at, access.issue_token())
+        application = create_app(bench, access, at, scene, arguments.settings.language, reach=reach)
+        async with serve(application, listener, listen.tls):
+            yield listen.url(at) if sessions.login_needed else f"{listen.url(at)}?token={access.issue_token()}"
     finally:
         await asyncio.to_thread(scene.close)
+
+
+def listen_of(arguments: argparse.Namespace) -> Listen:
+    """Where to serve: ``--listen``, else the loopback address. Raises UsageError."""
+    certificate, key = arguments.tls_cert, arguments.tls_key
+    if (certificate is None) != (key is None):
+        raise UsageError(reason="--tls-cert and --tls-key belong together")
+    tls = None if certificate is None else Tls(certificate, key)
+    if arguments.listen is None:
+        return Listen(port=arguments.port, tls=tls, names=tuple(arguments.host))
+    address, port = parse_listen(arguments.listen, arguments.port)
+    return Listen(address, port, tls, tuple(arguments.host))

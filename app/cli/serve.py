@@ -9,6 +9,7 @@ import importlib
 import signal
 import sys
 import time
+from pathlib import Path
 from typing import Any
 
 from app.cli.arguments import add_port
@@ -27,6 +28,12 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     add_connection(parser, required=False)
     parser.add_argument("--no-record", action="store_true", help="do not record")
     add_port(parser)
+    parser.add_argument("--listen", metavar="ADDRESS[:PORT]", help="serve on another address: by TLS, and with users")
+    parser.add_argument("--tls-cert", type=Path, metavar="FILE", help="certificate with its chain (PEM)")
+    parser.add_argument("--tls-key", type=Path, metavar="FILE", help="its private key (PEM)")
+    parser.add_argument(
+        "--host", action="append", default=[], metavar="NAME", help="a name under which browsers reach the page"
+    )
     parser.set_defaults(run=serve_turbine)
 
 

@@ -82,8 +82,8 @@ def back_up(source: sqlite3.Connection, target: Path) -> None:
     partial.replace(target)
 
 
-def restore(path: Path, backup: Path, aside: Path) -> None:
-    """Put ``backup`` in the place of the store at ``path``; what was there is kept at ``aside``.
+def restore(path: Path, backup: Path, aside: Path) -> bool:
+    """Put ``backup`` in the place of the store at ``path``; what was there is kept at ``aside``: True where it was.
 
     The caller holds the folder's lock. Raises StoreDamagedError or StoreError; then nothing has changed.
     """
@@ -93,11 +93,13 @@ def restore(path: Path, backup: Path, aside: Path) -> None:
     with contextlib.closing(sqlite3.connect(f"{backup.absolute().as_uri()}?mode=ro", uri=True)) as source:
         back_up(source, fresh)
     journal = Path(f"{path}-journal")
-    if path.exists():
+    existed = path.exists()
+    if existed:
         path.replace(aside)
     if journal.exists():  # it belongs to the file that was put aside: to the new one it would be poison
         journal.replace(Path(f"{aside}-journal"))
     fresh.replace(path)
+    return existed
 
 
 def _make_private(path: Path) -> None:

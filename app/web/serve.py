@@ -1,4 +1,4 @@
-"""Runs the server: a loopback port, a launch address that is printed, an end that is clean."""
+"""Runs the server: a listening port, a launch address that is printed, an end that is clean."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from typing import Any, Final
 import uvicorn
 
 from app.errors import UsageError
+from app.web.listen import Tls
 
 HOST: Final = "127.0.0.1"
 MAX_MESSAGE: Final = 1 << 30
@@ -22,20 +23,24 @@ START_TIMEOUT_S: Final = 10.0
 END_TIMEOUT_S: Final = 3.0
 
 
-def open_port(port: int) -> socket.socket:
-    """A listening socket on the loopback address; port 0 takes a free one. Raises UsageError where it is taken."""
+def open_port(port: int, address: str = HOST) -> socket.socket:
+    """A listening socket on ``address`` (IPv4 or IPv6); port 0 takes a free one.
+
+    Raises UsageError where it is taken.
+    """
     # The protocol is named because asyncio switches Nagle's algorithm off only for sockets that name it; with it a
     # message waits up to 40 ms for the browser's acknowledge of the one before.
-    listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM, socket.IPPROTO_TCP)
+    family = socket.AF_INET6 if ":" in address else socket.AF_INET
+    listener = socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)
     try:
         if sys.platform != "win32":  # there it would let two servers share the port
             listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER)  # taken over by its connections
-        listener.bind((HOST, port))
+        listener.bind((address, port))
         listener.listen(128)
     except OSError as error:
         listener.close()
-        raise UsageError(reason=f"port {port} of {HOST} cannot be opened: {error.strerror or error}") from error
+        raise UsageError(reason=f"port {port} of {address} cannot be opened: {error.strerror or error}") from error
     listener.setblocking(False)
     return listener
 
@@ -60,8 +65,11 @@ class _Server(uvicorn.Server):
 
 
 @contextlib.asynccontextmanager
-async def serve(app: Any, listener: socket.socket) -> AsyncIterator[None]:
-    """Serve ``app`` on ``listener`` while the block runs. Raises UsageError where it does not start."""
+async def serve(app: Any, listener: socket.socket, tls: Tls | None = None) -> AsyncIterator[None]:
+    """Serve ``app`` on ``listener`` while the block runs, by ``tls`` where given.
+
+    Raises UsageError where it does not start.
+    """
     config = uvicorn.Config(
         app,
         log_config=None,
@@ -73,6 +81,8 @@ async def serve(app: Any, listener: socket.socket) -> AsyncIterator[None]:
         ws_per_message_deflate=False,
         timeout_graceful_shutdown=int(END_TIMEOUT_S),
         lifespan="on",
+        ssl_certfile=None if tls is None else tls.certificate,
+        ssl_keyfile=None if tls is None else tls.key,
     )
     server = _Server(config)
     task = asyncio.create_task(server.serve(sockets=[listener]))
