@@ -41,10 +41,11 @@ def run(arguments: argparse.Namespace, output: Output) -> int:
 
         address = _address(twins)
         if address is None:  # the usual port is taken
+            running.close()
             twins = running.enter_context(_twins(arguments, data / "twins", 0))
             address = _address(twins)
-        if address is None:
-            raise BusOpenError(bus="twins", reason=_reason(twins))
+            if address is None:
+                raise BusOpenError(bus="twins", reason=_reason(twins))
         arguments.site = _site(data, address)
         return serve_turbine(arguments, output)
 
