@@ -16,11 +16,15 @@ from app.model.address import is_decimal
 from app.model.description_file import load_builtin
 from app.twins.line import CanLine
 from app.twins.line_thread import LineThread
+from app.twins.rotor import Rotor
 from app.twins.socketcand_server import SocketcandServer
+from app.twins.surroundings import Surroundings
 from app.twins.turbine import build_turbine
 
 SWITCH_INTERVAL_S = 0.0005
 """Threads of this process hand over faster than Python's 5 ms, else the bus would be late by as much."""
+ROTOR_SEED = 7
+"""Of the wind: every run has the same."""
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -59,6 +63,8 @@ def run(arguments: argparse.Namespace, output: Output) -> int:
     for problem in turbine.problems:
         output.say("cli.twin_problem", reason=problem)
     turbine.power_on(line.now_ns)
+    surroundings = Surroundings(line, Rotor(seed=ROTOR_SEED), [blade.axis for blade in turbine.blades])
+    surroundings.start(line.now_ns)
     thread = LineThread(line)
     try:
         server = SocketcandServer(thread, host, port)
@@ -67,6 +73,7 @@ def run(arguments: argparse.Namespace, output: Output) -> int:
     with thread, server:
         _announce(f"socketcand:{host}:{server.port}", len(turbine.devices), arguments.bitrate, output)
         stop.wait()
+    surroundings.stop()
     turbine.power_off()
     return 0
 

@@ -13,7 +13,7 @@ from typing import Any, Final
 
 from app.model.address import Address
 from app.model.description import Description
-from app.wire import emcy, nmt, sync
+from app.wire import emcy, nmt, sync, twin_environment
 from app.wire.frame import Can, Direction, Frame
 from app.wire.nmt import NmtState
 from app.wire.pdo import Slot, unpack
@@ -21,6 +21,7 @@ from app.wire.pdo_follower import NodeConfiguration, PdoRoute, configures
 from app.wire.records import (
     BootUpSeen,
     EmcySeen,
+    EnvironmentSeen,
     Fault,
     GapSeen,
     LoadSeen,
@@ -186,6 +187,7 @@ class CanOpenDecoder:
             routes[nmt.HEARTBEAT_BASE + node.number] = (self._on_heartbeat, node)
         routes[nmt.NMT_COB_ID] = (self._on_nmt, None)
         routes[sync.SYNC_COB_ID] = (self._on_sync, None)
+        routes[twin_environment.CAN_ID | _EXTENDED] = (self._on_environment, None)
         self._routes = routes
         self._speakers.clear()
 
@@ -283,6 +285,12 @@ class CanOpenDecoder:
         except ValueError:
             return (MalformedSeen(t_ns, self.bus, 0, can.can_id, Fault.LENGTH, can.data),)
         return (SyncSeen(t_ns, self.bus, 0, counter),)
+
+    def _on_environment(self, _target: None, t_ns: int, _direction: Direction, can: Can) -> Sequence[Record]:
+        try:
+            return (EnvironmentSeen(t_ns, self.bus, 0, twin_environment.parse_environment(can.data)),)
+        except ValueError:
+            return ()  # somebody else's frame: on a bus without twins the identifier means nothing to us
 
     # -- keyframes -------------------------------------------------------------
 

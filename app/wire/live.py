@@ -22,6 +22,7 @@ from app.wire.nmt import ALL_NODES, NmtCommand, NmtState
 from app.wire.records import (
     BootUpSeen,
     EmcySeen,
+    EnvironmentSeen,
     GapSeen,
     LoadSeen,
     MalformedSeen,
@@ -39,6 +40,7 @@ from app.wire.records import (
     ValueSeen,
 )
 from app.wire.sdo_follower import LOAD_INDEX, SAVE_INDEX
+from app.wire.twin_environment import TwinEnvironment
 
 __all__ = ["Changes", "LiveState", "NodeView", "ValueView"]
 
@@ -87,6 +89,7 @@ class LiveState:
         self._changed_cells: dict[Cell, None] = {}
         self._changed_nodes: dict[LiveNode, None] = {}
         self._events = EventLog(max_events)
+        self._environment: EnvironmentSeen | None = None
         self._handlers: dict[type, Callable[[Any], None]] = {
             ValueSeen: self._on_value,
             SdoSeen: self._on_sdo,
@@ -98,6 +101,7 @@ class LiveState:
             BootUpSeen: self._on_boot_up,
             EmcySeen: self._on_emcy,
             SyncSeen: self._on_sync,
+            EnvironmentSeen: self._on_environment,
             GapSeen: self._on_gap,
             MalformedSeen: self._on_malformed,
         }
@@ -189,6 +193,11 @@ class LiveState:
             seen = [node.view() for node in self._nodes.values() if node.seen]
         return sorted(seen, key=lambda view: (view.bus, view.node))
 
+    @property
+    def environment(self) -> EnvironmentSeen | None:
+        """Rotor and wind as a twin told them last; None where none did."""
+        return self._environment
+
     def events(self, since_version: int = 0) -> tuple[Event, ...]:
         """The kept events later than ``since_version``, oldest first."""
         with self._lock:
@@ -204,6 +213,7 @@ class LiveState:
                 "t_ns": self._t_ns,
                 "nodes": [node.snapshot() for node in self._nodes.values()],
                 "events": self._events.snapshot(_SNAPSHOT_EVENTS),
+                "environment": None if self._environment is None else list(self._environment),
             }
 
     def restore(self, state: Mapping[str, Any]) -> None:
@@ -219,11 +229,13 @@ class LiveState:
             node.restore(item)
         events = EventLog(self._max_events)
         events.restore(state["events"], self._version + 1)
+        environment = _environment_of(state.get("environment"))
         with self._lock:
             self._full_since = self._version
             for key, before in self._nodes.items():
                 nodes.setdefault(key, LiveNode(*key)).memory.description = before.memory.description
             self._nodes, self._events, self._t_ns = nodes, events, state["t_ns"]
+            self._environment = environment
             self._changed_cells, self._changed_nodes = {}, {}
             self._version += 1
             for node in nodes.values():
@@ -359,6 +371,10 @@ class LiveState:
     def _on_sync(self, seen: SyncSeen) -> None:
         """Time goes on; nothing else."""
 
+    def _on_environment(self, seen: EnvironmentSeen) -> None:
+        self._environment = seen
+        self._version += 1
+
     def _on_gap(self, seen: GapSeen) -> None:
         for node in self._nodes.values():
             if node.bus == seen.bus:
@@ -415,3 +431,14 @@ class LiveState:
 
 def _view(cell: Cell) -> ValueView:
     return ValueView(cell.bus, cell.node, cell.address, cell.reading, cell.stored, cell.stale, cell.version)
+
+
+def _environment_of(kept: list[Any] | None) -> EnvironmentSeen | None:
+    """What a snapshot kept; those of older recordings have nothing of the kind. Raises ValueError."""
+    if kept is None:
+        return None
+    try:
+        t_ns, bus, node, environment = kept
+        return EnvironmentSeen(t_ns, bus, node, TwinEnvironment(*environment))
+    except TypeError as error:
+        raise ValueError(f"{kept} is no environment") from error

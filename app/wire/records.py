@@ -11,6 +11,7 @@ from typing import NamedTuple
 from app.model.address import Address
 from app.wire.frame import Direction
 from app.wire.nmt import NmtCommand, NmtState
+from app.wire.twin_environment import TwinEnvironment
 
 
 class Source(Enum):
@@ -200,6 +201,15 @@ class SyncSeen(NamedTuple):
     counter: int | None
 
 
+class EnvironmentSeen(NamedTuple):
+    """A twin told rotor and wind (``app.wire.twin_environment``). ``node`` is 0."""
+
+    t_ns: int
+    bus: str
+    node: int
+    environment: TwinEnvironment
+
+
 class GapSeen(NamedTuple):
     """Frames are missing before ``t_ns``; ``reason`` is a text key. ``node`` is 0."""
 
@@ -231,6 +241,7 @@ Record = (
     | BootUpSeen
     | EmcySeen
     | SyncSeen
+    | EnvironmentSeen
     | GapSeen
     | MalformedSeen
 )
