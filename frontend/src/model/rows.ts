@@ -24,6 +24,9 @@ export interface GroupLine {
   open: boolean;
 }
 
+/** How many rows of each group have something to say. */
+export type GroupTally = ReadonlyMap<string, { pending: number; different: number }>;
+
 export interface EntryLine {
   kind: "entry";
   row: ParameterRow;

@@ -35,16 +35,23 @@ export interface Writing {
   sent: Record<string, Raw>;
 }
 
+/** A write that has ended, kept until its outcome was looked at. */
+export interface Outcome {
+  job: Job;
+  sent: Record<string, Raw>;
+}
+
 export interface StagedState {
   changes: ReadonlyMap<string, Change>;
   undo: readonly UndoSet[];
   writing: Writing | null;
+  outcome: Outcome | null;
 }
 
 export type Keeper = Pick<Storage, "getItem" | "setItem">;
 
 export const MOST_UNDO_SETS = 10;
-const EMPTY: StagedState = { changes: new Map(), undo: [], writing: null };
+const EMPTY: StagedState = { changes: new Map(), undo: [], writing: null, outcome: null };
 const WRITTEN: readonly Job["rows"][number]["state"][] = [
   "verified",
   "unproven",
@@ -60,7 +67,10 @@ export class StagedStore {
   private place: string | null = null;
   private readonly listeners = new Set<() => void>();
 
-  constructor(private readonly keeper: Keeper) {}
+  constructor(
+    private readonly keeper: Keeper,
+    private readonly nowMs: () => number,
+  ) {}
 
   readonly subscribe = (listener: () => void): (() => void) => {
     this.listeners.add(listener);
@@ -108,7 +118,7 @@ export class StagedStore {
 
   begin(job: string, changes: readonly Change[]): void {
     const sent = Object.fromEntries(changes.map((one) => [keyOf(one.device, one.address), one.raw]));
-    this.put({ writing: { job, sent } });
+    this.put({ writing: { job, sent }, outcome: null });
   }
 
   /** Nothing more will be heard of the job: the changes stay as they are. */
@@ -116,8 +126,13 @@ export class StagedStore {
     this.put({ writing: null });
   }
 
+  /** The outcome of the last write was looked at. */
+  dismiss(): void {
+    this.put({ outcome: null });
+  }
+
   /** Takes out what was written, marks what was refused, leaves what was not begun; gives the undo set. */
-  finish(job: Job, nowMs: number): UndoSet | null {
+  finish(job: Job): UndoSet | null {
     if (this.state.writing?.job !== job.id) return null;
     const { sent } = this.state.writing;
     const changes = new Map(this.state.changes);
@@ -135,21 +150,21 @@ export class StagedStore {
           undone.push({ device: row.device, address: row.address, was: row.was_raw, written: raw });
       }
     }
-    const set = undone.length === 0 ? null : { id: job.id, atMs: nowMs, rows: undone };
+    const set = undone.length === 0 ? null : { id: job.id, atMs: this.nowMs(), rows: undone };
     const undo = set === null ? this.state.undo : [set, ...this.state.undo].slice(0, MOST_UNDO_SETS);
-    this.put({ changes, undo, writing: null });
+    this.put({ changes, undo, writing: null, outcome: { job, sent } });
     return set;
   }
 
   /** Stages the values from before a write; what is pending already for an object gives way. */
-  undo(set: UndoSet, nowMs: number): void {
+  undo(set: UndoSet): void {
     this.stage(
       [...set.rows].reverse().map(({ device, address, was, written }) => ({
         device,
         address,
         raw: was,
         from: written,
-        atMs: nowMs,
+        atMs: this.nowMs(),
       })),
     );
   }
@@ -175,7 +190,7 @@ function read(text: string | null): StagedState {
   try {
     const kept = JSON.parse(text) as Omit<StagedState, "changes"> & { changes: Change[] };
     const changes = new Map(kept.changes.map((one) => [keyOf(one.device, one.address), one]));
-    return { changes, undo: kept.undo, writing: kept.writing };
+    return { changes, undo: kept.undo, writing: kept.writing, outcome: kept.outcome };
   } catch {
     return EMPTY;
   }

@@ -1,142 +1,109 @@
-import { IconPencil } from "@tabler/icons-react";
+import { IconStar, IconStarFilled } from "@tabler/icons-react";
 import { memo } from "react";
-import type { EntryDoc, Raw } from "../../api/types";
+import type { EntryDoc } from "../../api/types";
 import { useCell } from "../../live/live";
-import type { Cell } from "../../live/store";
 import type { ParameterRow } from "../../model/rows";
-import { limitText, lineOf, shownOf } from "../../model/shown";
-import { defaultOf } from "../../model/values";
-import { age, timeOfDay } from "../../ui/format";
-import { ageMsOf, isStale, isUnsaved, rawOf } from "./cellValue";
-import { Column } from "./columns";
-import { useDevice } from "./context";
+import { type DeviceContext, limitText, lineOf, shownOf } from "../../model/shown";
+import { defaultOf, isHex, quantityOf } from "../../model/values";
+import { dateAndTime } from "../../ui/format";
+import { isUnsaved } from "./cellValue";
+import { Column, type ColumnSpec } from "./columns";
+import { useBenchOfTable } from "./context";
+import { lastChangeOf } from "./history";
 import classes from "./Parameters.module.css";
+import { ValueCell, type ValueCellProps } from "./ValueCell";
 
 const DASH = "–";
-const FLASH_MS = 1500;
 
-interface CellProps {
-  row: ParameterRow;
-  nowMs: number;
-  silent: boolean;
-  onOpen: (address: string) => void;
+interface CellProps extends Omit<ValueCellProps, "device" | "editing"> {
+  spec: ColumnSpec;
+  /** Slug of the device whose value is edited in this row. */
+  editing: string | null;
+  onOpen: (address: string, slug: string) => void;
 }
 
-export const TableCell = memo(function TableCell({ column, ...props }: CellProps & { column: Column }) {
-  const { entry } = props.row;
-  switch (column) {
+export const TableCell = memo(function TableCell({ spec, editing, onOpen, ...props }: CellProps) {
+  const { row } = props;
+  const { entry } = row;
+  const { device } = spec;
+  switch (spec.column) {
+    case Column.Star:
+      return <StarCell row={row} t={device.t} />;
     case Column.Address:
       return <span className={classes.address}>{entry.address}</span>;
     case Column.Name:
-      return <NameCell row={props.row} />;
+      return <NameCell row={row} t={device.t} onOpen={(address) => onOpen(address, device.slug)} />;
+    case Column.Unit:
+      return <span className="dim">{isHex(entry) ? "" : quantityOf(entry, device.lookup).unit}</span>;
     case Column.Ram:
-      return <RamCell {...props} />;
+      return <ValueCell {...props} device={device} editing={editing === device.slug} />;
     case Column.Stored:
-      return <StoredCell entry={entry} />;
+      return <StoredCell entry={entry} device={device} />;
     case Column.Default:
-      return <DefaultCell entry={entry} />;
+      return <DefaultCell entry={entry} device={device} />;
     case Column.Limits:
-      return <LimitsCell entry={entry} />;
+      return (
+        <span className={`${classes.clip} dim`} title={limitText(entry, device, true)}>
+          {limitText(entry, device, false)}
+        </span>
+      );
     case Column.Access:
-      return <AccessCell entry={entry} />;
+      return (
+        <span className="dim" title={device.t(`page.access.${entry.access.replace("(w)", "_factory")}`)}>
+          {entry.access}
+        </span>
+      );
+    case Column.Changed:
+      return <ChangedCell address={entry.address} t={device.t} />;
     case Column.Section:
       return <span className="dim">{entry.section}</span>;
   }
 });
 
-/** Where both names do not fit, that of the object gives way: its lines differ in the other. */
-function NameCell({ row }: { row: ParameterRow }) {
-  return (
-    <span className={classes.name} title={row.title}>
-      {row.objectName !== null && <span className={classes.clip}>{row.objectName}</span>}
-      {row.objectName !== null && <span className={classes.colon}>:</span>}
-      <span className={classes.own}>{row.ownName}</span>
-    </span>
-  );
-}
+type Texts = DeviceContext["t"];
 
-function RamCell({ row, nowMs, silent, onOpen }: CellProps) {
-  const { t, slug } = useDevice();
-  const { entry, title } = row;
-  const cell = useCell(slug, entry.address);
-  const key = entry.writable ? "page.table.edit" : "page.table.open";
+function StarCell({ row, t }: { row: ParameterRow; t: Texts }) {
+  const { starred, toggleStar } = useBenchOfTable();
+  const { address } = row.entry;
+  const on = starred.has(address);
+  const Star = on ? IconStarFilled : IconStar;
   return (
     <button
       type="button"
       tabIndex={-1}
-      className={classes.value}
-      aria-label={t(key, { name: title })}
-      aria-describedby={`ram-${entry.address}`}
-      data-testid={`value-${entry.address}`}
-      onClick={() => onOpen(entry.address)}
+      className={classes.star}
+      aria-label={t("page.favourites.star", { name: row.title })}
+      aria-pressed={on}
+      data-testid={`star-${address}`}
+      onClick={() => toggleStar(address)}
     >
-      <RamText entry={entry} cell={cell} nowMs={nowMs} silent={silent} />
-      {entry.writable && <IconPencil size={15} className={classes.pencil} aria-hidden />}
+      <Star size={16} aria-hidden />
     </button>
   );
 }
 
-function RamText({
-  entry,
-  cell,
-  nowMs,
-  silent,
-}: Omit<CellProps, "row" | "onOpen"> & { entry: EntryDoc; cell: Cell | undefined }) {
-  const context = useDevice();
-  const { t } = context;
-  const raw = rawOf(cell);
-  if (!cell || raw === null) {
-    const text = entry.readable ? DASH : t("page.table.write_only");
-    return (
-      <span
-        id={`ram-${entry.address}`}
-        className="dim"
-        title={unknownTitle(cell, entry, context)}
-        data-known="false"
-      >
-        {text}
-      </span>
-    );
-  }
-  const shown = shownOf(entry, raw, context);
-  const stale = isStale(entry, cell, nowMs, silent);
-  const fresh = cell.changedAtMs !== null && nowMs - cell.changedAtMs < FLASH_MS;
+/** Where both names do not fit, that of the object gives way: its lines differ in the other. */
+function NameCell({ row, t, onOpen }: { row: ParameterRow; t: Texts; onOpen: (address: string) => void }) {
   return (
-    <span
-      key={cell.changedAtMs}
-      id={`ram-${entry.address}`}
-      className={classes.ram}
-      data-flash={fresh}
-      data-stale={stale}
-      data-unsaved={isUnsaved(entry, cell)}
-      data-known="true"
-      title={valueTitle(raw, cell, nowMs, shown.names.length > 0 ? lineOf(shown) : "", context)}
+    <button
+      type="button"
+      tabIndex={-1}
+      className={classes.name}
+      title={row.title}
+      aria-label={t("page.table.open", { name: row.title })}
+      data-testid={`open-${row.entry.address}`}
+      onClick={() => onOpen(row.entry.address)}
     >
-      <b>{shown.text}</b>
-      <i>{shown.names.length > 0 ? shown.names.join(", ") : shown.unit}</i>
-      {stale && <em>{age(ageMsOf(cell, nowMs), t.language)}</em>}
-    </span>
+      {row.objectName !== null && <span className={classes.clip}>{row.objectName}</span>}
+      {row.objectName !== null && <span className={classes.colon}>:</span>}
+      <span className={classes.own}>{row.ownName}</span>
+    </button>
   );
 }
 
-type Context = ReturnType<typeof useDevice>;
-
-function unknownTitle(cell: Cell | undefined, entry: EntryDoc, context: Context): string {
-  if (!entry.readable) return context.t("page.table.write_only_title");
-  return context.t(cell ? "page.table.unknown_since_restart" : "page.table.never_read");
-}
-
-function valueTitle(raw: Raw, cell: Cell, nowMs: number, line: string, { t }: Context): string {
-  const source = cell.source === null ? "–" : t(`page.source.${cell.source.replaceAll("-", "_")}`);
-  const time = timeOfDay((cell.t_ns ?? 0) / 1e6);
-  const details = { raw, hex: cell.hex, source, time, age: age(ageMsOf(cell, nowMs), t.language) };
-  return [line, t("page.table.raw_title", details)].filter(Boolean).join("\n");
-}
-
-function StoredCell({ entry }: { entry: EntryDoc }) {
-  const context = useDevice();
-  const { t } = context;
-  const cell = useCell(context.slug, entry.address);
+function StoredCell({ entry, device }: { entry: EntryDoc; device: DeviceContext }) {
+  const { t } = device;
+  const cell = useCell(device.slug, entry.address);
   if (!entry.saved) {
     return (
       <span className="dim" title={t("page.table.not_kept_title")}>
@@ -151,7 +118,7 @@ function StoredCell({ entry }: { entry: EntryDoc }) {
       </span>
     );
   }
-  const shown = shownOf(entry, cell.stored.raw, context);
+  const shown = shownOf(entry, cell.stored.raw, device);
   const state = t(`page.stored.${cell.stored.state}`);
   return (
     <span
@@ -168,11 +135,10 @@ function StoredCell({ entry }: { entry: EntryDoc }) {
   );
 }
 
-function DefaultCell({ entry }: { entry: EntryDoc }) {
-  const context = useDevice();
-  const raw = defaultOf(entry, context.node);
+function DefaultCell({ entry, device }: { entry: EntryDoc; device: DeviceContext }) {
+  const raw = defaultOf(entry, device.node);
   if (raw === null) return <span className="dim">{DASH}</span>;
-  const shown = shownOf(entry, raw, context);
+  const shown = shownOf(entry, raw, device);
   return (
     <span className={`${classes.clip} dim`} title={`${lineOf(shown)}\n${raw}`}>
       {shown.text}
@@ -180,21 +146,20 @@ function DefaultCell({ entry }: { entry: EntryDoc }) {
   );
 }
 
-function LimitsCell({ entry }: { entry: EntryDoc }) {
-  const context = useDevice();
-  const own = limitText(entry, context, false);
+/** When, who, from what; of several devices the latest. */
+function ChangedCell({ address, t }: { address: string; t: Texts }) {
+  const { devices, side, nameOf } = useBenchOfTable();
+  const last = lastChangeOf(address, devices);
+  if (last === null) return <span className="dim">{DASH}</span>;
+  const { change, slug } = last;
+  const when = dateAndTime(change.t_ns / 1e6);
+  const details = { when, person: change.person, was: change.was, now: change.now, device: nameOf(slug) };
   return (
-    <span className={`${classes.clip} dim`} title={limitText(entry, context, true)}>
-      {own}
-    </span>
-  );
-}
-
-function AccessCell({ entry }: { entry: EntryDoc }) {
-  const { t } = useDevice();
-  return (
-    <span className="dim" title={t(`page.access.${entry.access.replace("(w)", "_factory")}`)}>
-      {entry.access}
+    <span
+      className={`${classes.clip} dim`}
+      title={t(side ? "page.history.line_of" : "page.history.line", details)}
+    >
+      {when} {change.person}
     </span>
   );
 }

@@ -1,50 +1,59 @@
 import { Center, Loader } from "@mantine/core";
-import type { SortingState } from "@tanstack/react-table";
 import { useQuery } from "@tanstack/react-query";
-import { useCallback, useDeferredValue, useEffect, useMemo, useRef, useState } from "react";
-import { descriptionQuery, turbineQuery } from "../../api/queries";
+import { useEffect, useMemo } from "react";
+import { descriptionQuery, sessionQuery, turbineQuery } from "../../api/queries";
 import type { DescriptionDoc } from "../../api/types";
 import { usePageSearch } from "../../frame/search";
-import { store, useDeviceVersion, useWatchDevice } from "../../live/live";
-import { filterRows, type ParameterRow, rowsOf } from "../../model/rows";
-import type { DeviceContext } from "../../model/shown";
+import { useWatchDevice } from "../../live/live";
 import { useTexts } from "../../texts/texts";
-import { placesOf, type Place } from "../../ui/devices";
+import { placesOf, type Place, stationName } from "../../ui/devices";
 import { ProblemAlert } from "../../ui/ProblemAlert";
-import { differsFromDefault, rawOf } from "./cellValue";
-import { type Column, HIDDEN_AT_FIRST } from "./columns";
-import { DeviceContextOfTable } from "./context";
+import { type Bench, BenchContext, DeviceContextOfTable } from "./context";
 import { DevicePicker } from "./DevicePicker";
-import { EntryDialog } from "./EntryDialog";
+import { contextOf } from "./devicesOf";
+import { Dictionary } from "./Dictionary";
+import { useFavourites } from "./favourites";
 import classes from "./Parameters.module.css";
-import { ParameterTable } from "./ParameterTable";
-import { StateLine } from "./StateLine";
-import { Toolbar } from "./Toolbar";
-import { useSilent } from "./silent";
+import { PendingBar } from "./PendingBar";
+import { ReviewDialog } from "./ReviewDialog";
+import { type Selection, selectionOf } from "./selection";
+import { staged } from "./staging";
+import { useFinishWriting } from "./writing";
 
-/** Picks the device of the URL, or the first, and shows its dictionary. */
+/** Picks the devices of the URL, or the first, and shows their dictionary. */
 export function ParametersPage() {
   const t = useTexts();
   const [search, update] = usePageSearch();
   const turbine = useQuery(turbineQuery);
-  const places = placesOf(turbine.data);
-  const place = places.find((one) => one.device.slug === search.device) ?? places[0];
+  const places = useMemo(() => placesOf(turbine.data), [turbine.data]);
+  const selection = useMemo(
+    () => selectionOf(places, search.device, search.view),
+    [places, search.device, search.view],
+  );
   const description = useQuery({
-    ...descriptionQuery(place?.device.description_id ?? ""),
-    enabled: place !== undefined,
+    ...descriptionQuery(selection?.kind.descriptionId ?? ""),
+    enabled: selection !== null,
   });
+  const slug = turbine.data?.slug;
+  useEffect(() => {
+    if (slug !== undefined) staged.open(slug);
+  }, [slug]);
+  useFinishWriting();
   const error = turbine.error ?? description.error;
   return (
     <div className={classes.page}>
-      <DevicePicker
-        places={places}
-        value={place?.device.slug ?? null}
-        onPick={(device) => update({ device, edit: undefined })}
-      />
-      {error && <ProblemAlert error={error} title={t("page.table.not_loaded")} />}
-      {place && description.data && (
-        <Dictionary key={place.device.slug} place={place} doc={description.data} />
+      {selection && (
+        <div className={classes.top}>
+          <DevicePicker
+            places={places}
+            selection={selection}
+            onPick={(device, side) => update({ device, view: side ? "side" : undefined })}
+          />
+          <PendingBar />
+        </div>
       )}
+      {error && <ProblemAlert error={error} title={t("page.table.not_loaded")} />}
+      {selection && description.data && <Room places={places} selection={selection} doc={description.data} />}
       {!error && !description.data && (
         <Center h="60%">
           <Loader aria-label={t("page.loading")} />
@@ -54,106 +63,54 @@ export function ParametersPage() {
   );
 }
 
-function Dictionary({ place, doc }: { place: Place; doc: DescriptionDoc }) {
+interface RoomProps {
+  places: readonly Place[];
+  selection: Selection;
+  doc: DescriptionDoc;
+}
+
+function Room({ places, selection, doc }: RoomProps) {
   const t = useTexts();
-  const { slug, node } = place.device;
   const [search, update] = usePageSearch();
-  useWatchDevice(slug);
-  const context = useMemo<DeviceContext>(
-    () => ({ slug, node, doc, t, lookup: (address) => rawOf(store.cell(slug, address)) }),
-    [slug, node, doc, t],
+  const role = useQuery(sessionQuery).data?.role ?? "viewer";
+  const { starred, toggleStar } = useFavourites(doc.id);
+  const { kind, active, side } = selection;
+  const siblings = useMemo(() => kind.places.map((place) => contextOf(place, doc, t)), [kind, doc, t]);
+  const activeSlug = active.device.slug;
+  const device = siblings.find((one) => one.slug === activeSlug) ?? siblings[0];
+  const bench = useMemo<Bench>(
+    () => ({
+      devices: side ? siblings : siblings.filter((one) => one.slug === activeSlug),
+      siblings,
+      side,
+      role,
+      starred,
+      toggleStar,
+      nameOf: (slug) => {
+        const place = kind.places.find((one) => one.device.slug === slug);
+        return place ? stationName(place.station, t) : slug;
+      },
+    }),
+    [siblings, side, activeSlug, role, starred, toggleStar, kind, t],
   );
-  const all = useMemo(() => rowsOf(doc, t), [doc, t]);
-  const [typed, setTyped] = useFilter(search.q ?? "", (q) => update({ q: q === "" ? undefined : q }));
-  const deferred = useDeferredValue(typed);
-  const found = useMemo(() => filterRows(all, deferred), [all, deferred]);
-  const rows = useOnlyChanged(found, search.only === "changed", context);
-  const list = (text: string | undefined) => (text ? text.split(",") : []);
-  const closed = useMemo(
-    () => new Set(deferred === "" ? list(search.closed) : []),
-    [search.closed, deferred],
-  );
-  const hidden = useMemo(
-    () => (search.hide === undefined ? HIDDEN_AT_FIRST : list(search.hide)),
-    [search.hide],
-  );
-  const sorting = useMemo(() => sortingOf(search.sort), [search.sort]);
-  const visible = useRef<{ rows: ParameterRow[]; columns: Column[] }>({ rows: [], columns: [] });
-  const onLines = useCallback((shownRows: ParameterRow[], columns: Column[]) => {
-    visible.current = { rows: shownRows, columns };
-  }, []);
-  const onOpen = useCallback((edit: string) => update({ edit }), [update]);
-  const toggleGroup = (id: string, open = closed.has(id)) => {
-    const next = new Set(closed);
-    if (open) next.delete(id);
-    else next.add(id);
-    update({ closed: next.size === 0 ? undefined : [...next].join() });
-  };
-  const edited = all.find((row) => row.entry.address === search.edit);
+  if (!device) return null;
   return (
-    <DeviceContextOfTable value={context}>
-      <Toolbar filter={typed} onFilter={setTyped} hidden={hidden} visible={visible} entries={doc.entries} />
-      <StateLine slug={slug} />
-      <ParameterTable
-        rows={rows}
-        silent={useSilent(slug)}
-        sorting={sorting}
-        hidden={hidden}
-        closed={closed}
-        onSort={(sort) => update({ sort: sort[0] ? `${sort[0].desc ? "-" : ""}${sort[0].id}` : undefined })}
-        onToggleGroup={toggleGroup}
-        onOpen={onOpen}
-        onLines={onLines}
-      />
-      <p className={classes.legend}>
-        <strong role="status" data-testid="count">
-          {t("page.table.count", { shown: rows.length, total: all.length })}
-        </strong>
-        <span>{t("page.table.legend")}</span>
-      </p>
-      {edited && (
-        <EntryDialog key={edited.entry.address} row={edited} onClose={() => update({ edit: undefined })} />
-      )}
-    </DeviceContextOfTable>
+    <BenchContext value={bench}>
+      <DeviceContextOfTable value={device}>
+        {siblings.map(({ slug }) => (
+          <Watch key={slug} slug={slug} />
+        ))}
+        <Dictionary key={side ? doc.id : activeSlug} />
+        {search.review === "open" && (
+          <ReviewDialog places={places} onClose={() => update({ review: undefined })} />
+        )}
+      </DeviceContextOfTable>
+    </BenchContext>
   );
 }
 
-function sortingOf(sort: string | undefined): SortingState {
-  if (!sort) return [];
-  return sort.startsWith("-") ? [{ id: sort.slice(1), desc: true }] : [{ id: sort, desc: false }];
-}
-
-const URL_DELAY_MS = 300;
-
-/** What is typed is shown at once; the URL follows when the typing pauses. */
-function useFilter(inUrl: string, write: (filter: string) => void): [string, (typed: string) => void] {
-  const [typed, setTyped] = useState(inUrl);
-  const latest = useRef(write);
-  useEffect(() => {
-    latest.current = write;
-  });
-  useEffect(() => {
-    if (typed === inUrl) return;
-    const timer = setTimeout(() => latest.current(typed), URL_DELAY_MS);
-    return () => clearTimeout(timer);
-    // The URL is an outcome here, never a cause.
-    // eslint-disable-next-line react-hooks/exhaustive-deps
-  }, [typed]);
-  return [typed, setTyped];
-}
-
-function useOnlyChanged(rows: readonly ParameterRow[], wanted: boolean, context: DeviceContext) {
-  const version = useDeviceVersion(context.slug);
-  const relevant = wanted ? version : 0;
-  return useMemo(
-    () =>
-      wanted
-        ? rows.filter(({ entry }) =>
-            differsFromDefault(entry, store.cell(context.slug, entry.address), context.node),
-          )
-        : rows,
-    // The store is read afresh whenever values of the device came.
-    // eslint-disable-next-line react-hooks/exhaustive-deps
-    [rows, wanted, context, relevant],
-  );
+/** Keeps the values of one device coming: of all of the kind, as they are compared even where one is shown. */
+function Watch({ slug }: { slug: string }) {
+  useWatchDevice(slug);
+  return null;
 }

@@ -12,23 +12,33 @@ import { type ReadAll, useReadAll, useReadAtFirstSight } from "./readAll";
 import { useSilent } from "./silent";
 
 /** One line between tools and table: how far a reading is, or what is missing and the next step. */
-export function StateLine({ slug }: { slug: string }) {
+export function StateLine({ slug, name }: { slug: string; name: string | null }) {
   const reading = useReadAll(slug);
   useReadAtFirstSight(slug, reading);
   const silent = useSilent(slug);
   if (reading.running)
-    return <Reading done={reading.job?.done ?? 0} total={reading.job?.total ?? 0} cancel={reading.cancel} />;
-  if (silent) return <Silent slug={slug} />;
+    return (
+      <Reading
+        name={name}
+        done={reading.job?.done ?? 0}
+        total={reading.job?.total ?? 0}
+        cancel={reading.cancel}
+      />
+    );
+  if (silent) return <Silent slug={slug} name={name} />;
   return (
     <>
-      <Failures job={reading.job} />
-      <Missing slug={slug} reading={reading} />
+      <Failures job={reading.job} name={name} />
+      <Missing slug={slug} reading={reading} name={name} />
     </>
   );
 }
 
+/** Begins a line with the device where several are shown. */
+const of = (name: string | null, text: string): string => (name === null ? text : `${name}: ${text}`);
+
 /** What the last reading could not get, and why. */
-function Failures({ job }: { job: Job | undefined }) {
+function Failures({ job, name }: { job: Job | undefined; name: string | null }) {
   const t = useTexts();
   if (!job || (job.failed.length === 0 && !job.error)) return null;
   const reasons = [...(job.error ? [job.error] : []), ...job.failed];
@@ -36,7 +46,8 @@ function Failures({ job }: { job: Job | undefined }) {
   return (
     <details className={classes.failures} data-testid="read-failures">
       <summary>
-        <IconAlertTriangle size={17} aria-hidden /> {title} <IconChevronDown size={17} aria-hidden />
+        <IconAlertTriangle size={17} aria-hidden /> {of(name, title)}{" "}
+        <IconChevronDown size={17} aria-hidden />
       </summary>
       <ul>
         {reasons.map((failure) => (
@@ -49,9 +60,16 @@ function Failures({ job }: { job: Job | undefined }) {
   );
 }
 
-function Reading({ done, total, cancel }: { done: number; total: number; cancel: () => void }) {
+interface ReadingProps {
+  name: string | null;
+  done: number;
+  total: number;
+  cancel: () => void;
+}
+
+function Reading({ name, done, total, cancel }: ReadingProps) {
   const t = useTexts();
-  const label = t("page.read.progress", { done, total });
+  const label = of(name, t("page.read.progress", { done, total }));
   return (
     <div className={classes.reading} role="status" data-testid="read-progress">
       <span>{label}</span>
@@ -63,7 +81,7 @@ function Reading({ done, total, cancel }: { done: number; total: number; cancel:
   );
 }
 
-function Silent({ slug }: { slug: string }) {
+function Silent({ slug, name }: { slug: string; name: string | null }) {
   const t = useTexts();
   const nowMs = useServerNow(500);
   const { ageMs } = heartbeatOf(useNodes().get(slug), nowMs);
@@ -75,14 +93,14 @@ function Silent({ slug }: { slug: string }) {
       variant="light"
       p="xs"
       icon={<IconClockOff aria-hidden />}
-      title={text}
+      title={of(name, text)}
       data-testid="silent"
     />
   );
 }
 
 /** After a restart everything is unknown: say so and offer the one thing that helps. What refused is not asked again. */
-function Missing({ slug, reading }: { slug: string; reading: ReadAll }) {
+function Missing({ slug, reading, name }: { slug: string; reading: ReadAll; name: string | null }) {
   const t = useTexts();
   const { doc } = useDevice();
   const version = useDeviceVersion(slug);
@@ -97,7 +115,7 @@ function Missing({ slug, reading }: { slug: string; reading: ReadAll }) {
   const all = doc.entries.filter((entry) => entry.readable).length;
   return (
     <div className={classes.reading} data-testid="missing">
-      <span>{t("page.read.missing", { missing: missing.length, all })}</span>
+      <span>{of(name, t("page.read.missing", { missing: missing.length, all }))}</span>
       <Button
         leftSection={<IconRefresh size={17} aria-hidden />}
         onClick={() => reading.start(missing.length === all ? null : missing)}

@@ -1,61 +1,50 @@
-import { ActionIcon, Button, Checkbox, CloseButton, Menu, TextInput, Tooltip } from "@mantine/core";
+import { ActionIcon, Button, CloseButton, Indicator, Menu, TextInput, Tooltip } from "@mantine/core";
 import {
-  IconCopy,
-  IconDeviceFloppy,
-  IconDownload,
+  IconAdjustmentsHorizontal,
   IconFilter,
-  IconRefresh,
-  IconRotateClockwise2,
+  IconListTree,
   IconSquare,
   IconSquareCheck,
-  IconTable,
 } from "@tabler/icons-react";
-import { type RefObject, useEffect, useRef, useState } from "react";
-import type { EntryDoc } from "../../api/types";
-import { usePageSearch } from "../../frame/search";
-import type { ParameterRow } from "../../model/rows";
+import { useEffect, useRef } from "react";
+import type { GroupTally } from "../../model/rows";
 import { useTexts } from "../../texts/texts";
-import { notify } from "../../ui/notices";
-import { ALWAYS_SHOWN, cellText, Column } from "./columns";
-import { useDevice } from "./context";
-import { csvOf, download, tsvOf } from "./export";
+import { useBenchOfTable } from "./context";
+import { DeviceActions } from "./DeviceActions";
+import { Tally } from "./Lines";
+import { Only } from "./only";
 import classes from "./Parameters.module.css";
-import { RestartDialog, SaveDialog } from "./DeviceDialogs";
-import { useReadAll } from "./readAll";
-import { useSilent } from "./silent";
+import { TableMenu, type Visible } from "./TableMenu";
 
 interface Props {
   filter: string;
   onFilter: (typed: string) => void;
+  /** From the filter into the table. */
+  onEnter: () => void;
+  only: ReadonlySet<Only>;
+  onOnly: (only: ReadonlySet<Only>) => void;
   hidden: readonly string[];
-  visible: RefObject<{ rows: ParameterRow[]; columns: Column[] }>;
-  entries: readonly EntryDoc[];
+  onHide: (ids: string[]) => void;
+  visible: Visible;
+  tally: GroupTally;
+  onJump: (group: string) => void;
 }
 
-export function Toolbar({ filter, onFilter, hidden, visible, entries }: Props) {
+export function Toolbar(props: Props) {
   const t = useTexts();
-  const [search, update] = usePageSearch();
   return (
     <div className={classes.toolbar} role="toolbar" aria-label={t("page.table.tools")}>
-      <FilterInput filter={filter} onFilter={onFilter} />
-      <Checkbox
-        label={t("page.table.only_changed")}
-        checked={search.only === "changed"}
-        onChange={(event) => update({ only: event.currentTarget.checked ? "changed" : undefined })}
-        data-testid="only-changed"
-      />
-      <TableMenu
-        hidden={hidden}
-        onHide={(ids) => update({ hide: ids.length === 0 ? "none" : ids.join() })}
-        visible={visible}
-      />
+      <FilterInput filter={props.filter} onFilter={props.onFilter} onEnter={props.onEnter} />
+      <OnlyMenu only={props.only} onOnly={props.onOnly} />
+      <GroupMenu tally={props.tally} onJump={props.onJump} />
+      <TableMenu hidden={props.hidden} onHide={props.onHide} visible={props.visible} />
       <span className={classes.spacer} />
-      <DeviceActions entries={entries} />
+      <DeviceActions />
     </div>
   );
 }
 
-function FilterInput({ filter, onFilter }: { filter: string; onFilter: (typed: string) => void }) {
+function FilterInput({ filter, onFilter, onEnter }: Pick<Props, "filter" | "onFilter" | "onEnter">) {
   const t = useTexts();
   const input = useRef<HTMLInputElement>(null);
   useEffect(() => {
@@ -85,127 +74,105 @@ function FilterInput({ filter, onFilter }: { filter: string; onFilter: (typed: s
       }
       value={filter}
       onChange={(event) => onFilter(event.currentTarget.value)}
+      onKeyDown={(event) => {
+        if (event.key !== "ArrowDown" && event.key !== "Enter") return;
+        event.preventDefault();
+        onEnter();
+      }}
       data-testid="filter"
     />
   );
 }
 
-interface MenuProps extends Pick<Props, "hidden" | "visible"> {
-  onHide: (ids: string[]) => void;
+/** Which parameters: a button that says how many filters are set, as a hidden filter must never hide rows unseen. */
+function OnlyMenu({ only, onOnly }: Pick<Props, "only" | "onOnly">) {
+  const t = useTexts();
+  const { siblings } = useBenchOfTable();
+  const choices = Object.values(Only).filter((one) => one !== Only.Different || siblings.length > 1);
+  const toggle = (one: Only) => {
+    const next = new Set(only);
+    if (!next.delete(one)) next.add(one);
+    onOnly(next);
+  };
+  return (
+    <>
+      {choices
+        .filter((one) => only.has(one))
+        .map((one) => (
+          <Button
+            key={one}
+            variant="light"
+            px="sm"
+            rightSection={<span aria-hidden>✕</span>}
+            aria-label={t("page.only.remove", { name: t(`page.only.${one}`) })}
+            onClick={() => toggle(one)}
+            data-testid={`without-${one}`}
+          >
+            {t(`page.only.${one}`)}
+          </Button>
+        ))}
+      <Menu position="bottom-start" closeOnItemClick={false}>
+        <Menu.Target>
+          <Tooltip label={t("page.only.menu")}>
+            <Indicator disabled={only.size === 0} label={only.size} size={16} offset={4}>
+              <ActionIcon aria-label={t("page.only.menu")} data-testid="only-menu">
+                <IconAdjustmentsHorizontal size={18} aria-hidden />
+              </ActionIcon>
+            </Indicator>
+          </Tooltip>
+        </Menu.Target>
+        <Menu.Dropdown>
+          <Menu.Label>{t("page.only.label")}</Menu.Label>
+          {choices.map((one) => {
+            const Box = only.has(one) ? IconSquareCheck : IconSquare;
+            return (
+              <Menu.Item
+                key={one}
+                role="menuitemcheckbox"
+                aria-checked={only.has(one)}
+                mih={40}
+                leftSection={<Box size={17} aria-hidden />}
+                onClick={() => toggle(one)}
+                data-testid={`only-${one}`}
+              >
+                {t(`page.only.${one}`)}
+              </Menu.Item>
+            );
+          })}
+        </Menu.Dropdown>
+      </Menu>
+    </>
+  );
 }
 
-/** Columns to show, and the rows shown as text to take along. */
-function TableMenu({ hidden, onHide, visible }: MenuProps) {
+function GroupMenu({ tally, onJump }: Pick<Props, "tally" | "onJump">) {
   const t = useTexts();
-  const { copy, save } = useTakeAlong(visible);
-  const choices = Object.values(Column).filter((column) => !ALWAYS_SHOWN.includes(column));
-  const toggle = (column: Column) =>
-    onHide(choices.filter((one) => (one === column ? !hidden.includes(one) : hidden.includes(one))));
+  const { devices } = useBenchOfTable();
+  const groups = (devices[0]?.doc.groups ?? []).filter((group) => tally.has(group.id));
   return (
     <Menu position="bottom-start">
       <Menu.Target>
-        <Tooltip label={t("page.table.menu")}>
-          <ActionIcon aria-label={t("page.table.menu")} data-testid="table-menu">
-            <IconTable size={18} aria-hidden />
+        <Tooltip label={t("page.table.groups")}>
+          <ActionIcon aria-label={t("page.table.groups")} data-testid="groups">
+            <IconListTree size={18} aria-hidden />
           </ActionIcon>
         </Tooltip>
       </Menu.Target>
-      <Menu.Dropdown>
-        <Menu.Item mih={40} leftSection={<IconCopy size={17} aria-hidden />} onClick={copy}>
-          {t("page.table.copy")}
-        </Menu.Item>
-        <Menu.Item mih={40} leftSection={<IconDownload size={17} aria-hidden />} onClick={save}>
-          {t("page.table.export")}
-        </Menu.Item>
-        <Menu.Divider />
-        <Menu.Label>{t("page.table.columns")}</Menu.Label>
-        {choices.map((column) => (
+      <Menu.Dropdown mah={480} className={classes.groupMenu}>
+        <Menu.Label>{t("page.table.groups")}</Menu.Label>
+        {groups.map((group) => (
           <Menu.Item
-            key={column}
-            role="menuitemcheckbox"
-            aria-checked={!hidden.includes(column)}
-            closeMenuOnClick={false}
+            key={group.id}
             mih={40}
-            leftSection={
-              hidden.includes(column) ? (
-                <IconSquare size={17} aria-hidden />
-              ) : (
-                <IconSquareCheck size={17} aria-hidden />
-              )
-            }
-            onClick={() => toggle(column)}
+            onClick={() => onJump(group.id)}
+            data-testid={`jump-${group.id}`}
           >
-            {t(`page.table.column.${column}`)}
+            <span className={classes.groupItem}>
+              {t(group.text_key)} <Tally tally={tally.get(group.id)} t={t} />
+            </span>
           </Menu.Item>
         ))}
       </Menu.Dropdown>
     </Menu>
-  );
-}
-
-function useTakeAlong(visible: Props["visible"]): { copy: () => void; save: () => void } {
-  const t = useTexts();
-  const context = useDevice();
-  const table = () => {
-    const { rows, columns } = visible.current;
-    const heads = columns.map((column) => t(`page.table.column.${column}`));
-    return [heads, ...rows.map((row) => columns.map((column) => cellText(column, row, context)))];
-  };
-  const copy = () => {
-    const lines = table();
-    const done = () =>
-      notify({ tone: "ok", title: t("page.table.copied", { rows: lines.length - 1 }), lines: [] });
-    const failed = () => notify({ tone: "error", title: t("page.table.copy_failed"), lines: [] });
-    navigator.clipboard.writeText(tsvOf(lines)).then(done, failed);
-  };
-  return { copy, save: () => download(`${context.slug.replaceAll("/", "_")}.csv`, csvOf(table())) };
-}
-
-enum Dialog {
-  Save,
-  Restart,
-}
-
-function DeviceActions({ entries }: { entries: readonly EntryDoc[] }) {
-  const t = useTexts();
-  const { slug } = useDevice();
-  const reading = useReadAll(slug);
-  const silent = useSilent(slug);
-  const [dialog, setDialog] = useState<Dialog | null>(null);
-  const close = () => setDialog(null);
-  return (
-    <div className={classes.icons}>
-      <Button
-        px="sm"
-        variant="default"
-        leftSection={<IconRefresh size={17} aria-hidden />}
-        disabled={silent || reading.running}
-        onClick={() => reading.start(null)}
-        data-testid="read-all"
-      >
-        {t("page.read.all")}
-      </Button>
-      <Button
-        px="sm"
-        leftSection={<IconDeviceFloppy size={17} aria-hidden />}
-        disabled={silent}
-        onClick={() => setDialog(Dialog.Save)}
-        data-testid="save"
-      >
-        {t("page.save.open")}
-      </Button>
-      <Button
-        px="sm"
-        variant="default"
-        leftSection={<IconRotateClockwise2 size={17} aria-hidden />}
-        disabled={silent}
-        onClick={() => setDialog(Dialog.Restart)}
-        data-testid="restart"
-      >
-        {t("page.restart.open")}
-      </Button>
-      {dialog === Dialog.Save && <SaveDialog entries={entries} onClose={close} />}
-      {dialog === Dialog.Restart && <RestartDialog entries={entries} onClose={close} />}
-    </div>
   );
 }

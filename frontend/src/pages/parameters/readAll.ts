@@ -5,7 +5,7 @@ import { commands } from "../../api/client";
 import { jobQuery, queryClient } from "../../api/queries";
 import type { Job } from "../../api/types";
 import { store, useDeviceVersion } from "../../live/live";
-import { useTexts } from "../../texts/texts";
+import { type Translate, useTexts } from "../../texts/texts";
 import { notify } from "../../ui/notices";
 import { storyOf } from "../../ui/problem";
 import { useSilent } from "./silent";
@@ -30,16 +30,10 @@ export function useReadAll(slug: string): ReadAll {
     staleTime: Infinity,
   }).data;
   const job = useQuery(jobQuery(id ?? null)).data;
-  const failed = (error: unknown) => {
-    const story = storyOf(error, t);
-    notify({ tone: "error", title: t("page.read.failed"), lines: [story.happened, story.next] });
-  };
+  const failed = (error: unknown) => tellFailed(error, t);
   const start = useMutation({
     mutationFn: (addresses: string[] | null) => commands.read(slug, addresses),
-    onSuccess: (begun) => {
-      queryClient.setQueryData(["job", begun.id], begun);
-      queryClient.setQueryData(runningKey(slug), begun.id);
-    },
+    onSuccess: (begun) => remember(slug, begun),
     onError: failed,
   });
   const cancel = useMutation({ mutationFn: commands.cancel, onError: failed });
@@ -51,6 +45,29 @@ export function useReadAll(slug: string): ReadAll {
       if (job) cancel.mutate(job.id);
     },
   };
+}
+
+/** Reads several devices completely, each in a job of its own that its hook shows. */
+export function useReadMany(): (slugs: readonly string[]) => void {
+  const t = useTexts();
+  return (slugs) => {
+    for (const slug of slugs) {
+      commands.read(slug, null).then(
+        (begun) => remember(slug, begun),
+        (error: unknown) => tellFailed(error, t),
+      );
+    }
+  };
+}
+
+function remember(slug: string, begun: Job): void {
+  queryClient.setQueryData(["job", begun.id], begun);
+  queryClient.setQueryData(runningKey(slug), begun.id);
+}
+
+function tellFailed(error: unknown, t: Translate): void {
+  const story = storyOf(error, t);
+  notify({ tone: "error", title: t("page.read.failed"), lines: [story.happened, story.next] });
 }
 
 /** The first time that a device without any known value is opened, it is read by itself. Never again after that. */

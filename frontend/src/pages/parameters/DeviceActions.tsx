@@ -1,0 +1,77 @@
+import { Button } from "@mantine/core";
+import { IconDeviceFloppy, IconRefresh, IconRotateClockwise2 } from "@tabler/icons-react";
+import { useState } from "react";
+import { useTexts } from "../../texts/texts";
+import { useBenchOfTable, useDevice } from "./context";
+import { RestartDialog, SaveDialog } from "./DeviceDialogs";
+import classes from "./Parameters.module.css";
+import { useReadAll, useReadMany } from "./readAll";
+import { useSilent } from "./silent";
+
+enum Dialog {
+  Save,
+  Restart,
+}
+
+/** Reading is for all that is shown; a save or a restart is always for one device, the one that was picked. */
+export function DeviceActions() {
+  const t = useTexts();
+  const { role, side } = useBenchOfTable();
+  const { slug, doc } = useDevice();
+  const silent = useSilent(slug);
+  const [dialog, setDialog] = useState<Dialog | null>(null);
+  const close = () => setDialog(null);
+  const barred = silent || role === "viewer";
+  return (
+    <div className={classes.icons}>
+      <ReadAllButton />
+      {!side && (
+        <>
+          <Button
+            px="sm"
+            variant="default"
+            leftSection={<IconDeviceFloppy size={17} aria-hidden />}
+            disabled={barred}
+            onClick={() => setDialog(Dialog.Save)}
+            data-testid="save"
+          >
+            {t("page.save.open")}
+          </Button>
+          <Button
+            px="sm"
+            variant="default"
+            leftSection={<IconRotateClockwise2 size={17} aria-hidden />}
+            disabled={barred}
+            onClick={() => setDialog(Dialog.Restart)}
+            data-testid="restart"
+          >
+            {t("page.restart.open")}
+          </Button>
+        </>
+      )}
+      {dialog === Dialog.Save && <SaveDialog entries={doc.entries} onClose={close} />}
+      {dialog === Dialog.Restart && <RestartDialog entries={doc.entries} onClose={close} />}
+    </div>
+  );
+}
+
+function ReadAllButton() {
+  const t = useTexts();
+  const { role, devices } = useBenchOfTable();
+  const { slug } = useDevice();
+  const reading = useReadAll(slug);
+  const readMany = useReadMany();
+  const silent = useSilent(slug);
+  return (
+    <Button
+      px="sm"
+      variant="default"
+      leftSection={<IconRefresh size={17} aria-hidden />}
+      disabled={(silent && devices.length === 1) || reading.running || role === "viewer"}
+      onClick={() => readMany(devices.map((one) => one.slug))}
+      data-testid="read-all"
+    >
+      {t("page.read.all")}
+    </Button>
+  );
+}

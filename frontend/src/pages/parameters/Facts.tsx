@@ -1,0 +1,114 @@
+import type { EntryDoc } from "../../api/types";
+import { restsOn } from "../../model/values";
+import { type ParameterRow, titleOf } from "../../model/rows";
+import { limitText } from "../../model/shown";
+import { isHex, quantityOf } from "../../model/values";
+import { dateAndTime } from "../../ui/format";
+import { useBenchOfTable, useDevice } from "./context";
+import { changesOf } from "./history";
+import classes from "./Parameters.module.css";
+import { entriesOf } from "./staging";
+
+interface Props {
+  row: ParameterRow;
+  onOpen: (address: string) => void;
+}
+
+/** What the description knows of an object, what it depends on and who depends on it, and its history. */
+export function Facts({ row, onOpen }: Props) {
+  const device = useDevice();
+  const { t, doc } = device;
+  const { entry } = row;
+  const unit = isHex(entry) ? "" : quantityOf(entry, device.lookup).unit;
+  const facts: [string, string][] = [
+    ["limits", `${limitText(entry, device, true) || "–"} ${unit}`.trim()],
+    ["type", entry.type],
+    ["access", t(`page.access.${entry.access.replace("(w)", "_factory")}`)],
+    ["restore", t(`page.restore.${entry.restore}`)],
+    ["verify", t(`page.verify.${entry.verify}`)],
+    ["section", entry.section || "–"],
+  ];
+  const needs = entry.requires.map(({ address, values }) => `${address} = ${values.map(String).join(", ")}`);
+  if (needs.length > 0) facts.push(["requires", needs.join("; ")]);
+  return (
+    <div className={classes.facts}>
+      {entry.note !== null && <p>{t(entry.note)}</p>}
+      <dl>
+        {facts.map(([name, text]) => (
+          <div key={name} data-testid={`entry-${name}`}>
+            <dt className="dim">{t(`page.entry.${name}`)}</dt>
+            <dd>{text}</dd>
+          </div>
+        ))}
+      </dl>
+      <Links title={t("page.entry.rests_on")} addresses={restsOn(entry)} onOpen={onOpen} />
+      <Links title={t("page.entry.used_by")} addresses={usedBy(entry, doc.entries)} onOpen={onOpen} />
+      <History entry={entry} />
+    </div>
+  );
+}
+
+/** Objects whose unit, limits or preconditions rest on this one. */
+function usedBy(entry: EntryDoc, entries: readonly EntryDoc[]): string[] {
+  return entries.filter((one) => restsOn(one).includes(entry.address)).map((one) => one.address);
+}
+
+function Links({
+  title,
+  addresses,
+  onOpen,
+}: {
+  title: string;
+  addresses: string[];
+  onOpen: Props["onOpen"];
+}) {
+  const { t, doc } = useDevice();
+  if (addresses.length === 0) return null;
+  return (
+    <section>
+      <h3>{title}</h3>
+      <ul>
+        {addresses.map((address) => {
+          const entry = entriesOf(doc).get(address);
+          return (
+            <li key={address}>
+              <button type="button" className={classes.link} onClick={() => onOpen(address)}>
+                {address} {entry ? titleOf(entry, t) : ""}
+              </button>
+            </li>
+          );
+        })}
+      </ul>
+    </section>
+  );
+}
+
+const MOST_CHANGES = 20;
+
+function History({ entry }: { entry: EntryDoc }) {
+  const { t } = useDevice();
+  const { devices, nameOf } = useBenchOfTable();
+  const changes = devices
+    .flatMap(({ slug }) => changesOf(slug, entry.address).map((change) => ({ slug, change })))
+    .sort((a, b) => b.change.t_ns - a.change.t_ns)
+    .slice(0, MOST_CHANGES);
+  return (
+    <section data-testid="history">
+      <h3>{t("page.history.title")}</h3>
+      {changes.length === 0 && <p className="dim">{t("page.history.none")}</p>}
+      <ul>
+        {changes.map(({ slug, change }) => (
+          <li key={`${slug} ${change.t_ns}`}>
+            {t(devices.length > 1 ? "page.history.line_of" : "page.history.line", {
+              when: dateAndTime(change.t_ns / 1e6),
+              person: change.person,
+              was: change.was,
+              now: change.now,
+              device: nameOf(slug),
+            })}
+          </li>
+        ))}
+      </ul>
+    </section>
+  );
+}

@@ -1,0 +1,224 @@
+import { ActionIcon, Alert, Button, Checkbox, Group, SegmentedControl, Stack, Text } from "@mantine/core";
+import { IconArrowRight, IconTrash } from "@tabler/icons-react";
+import { useState } from "react";
+import type { Raw, WritesRequest } from "../../api/types";
+import { useDeviceVersion, useWatchDevice } from "../../live/live";
+import { asks, FindingKind, planOf, type PlannedRow, stops } from "../../model/findings";
+import { titleOf } from "../../model/rows";
+import { type DeviceContext, lineOf, shownOf } from "../../model/shown";
+import { type Change, keyOf } from "../../model/staged";
+import { useTexts } from "../../texts/texts";
+import { type Place, useDeviceName } from "../../ui/devices";
+import { HoldButton } from "../../ui/HoldButton";
+import { useBenchOfTable } from "./context";
+import { useContexts } from "./devicesOf";
+import { FindingList } from "./FindingList";
+import classes from "./Parameters.module.css";
+import { entriesOf, groundOf, plannedContext, staged, useStaged } from "./staging";
+import { useSilent } from "./silent";
+import { reasonOf } from "./ValueCell";
+import { useWrite } from "./writing";
+
+interface DevicePlan {
+  slug: string;
+  context: DeviceContext | undefined;
+  rows: PlannedRow[];
+}
+
+/** Everything that is pending, device by device in the order in which it will be written. */
+export function ReviewList({ places, onClose }: { places: readonly Place[]; onClose: () => void }) {
+  const t = useTexts();
+  const plans = usePlans(places);
+  const write = useWrite();
+  const [noSave, setNoSave] = useState<ReadonlySet<string>>(new Set());
+  const [onFailure, setOnFailure] = useState<WritesRequest["on_failure"]>("stop");
+  const rows = plans.flatMap((plan) => plan.rows);
+  const stopped = rows.filter(stops).length + plans.filter((one) => !one.context).length;
+  const asked = rows.filter(asks).length;
+  const save = plans.filter((one) => !noSave.has(one.slug)).map((one) => one.slug);
+  const toggleSave = (slug: string) => {
+    const next = new Set(noSave);
+    if (!next.delete(slug)) next.add(slug);
+    setNoSave(next);
+  };
+  if (rows.length === 0) return <Nothing onClose={onClose} />;
+  return (
+    <Stack gap="md">
+      <Text size="sm" className="dim">
+        {t("page.review.explain")}
+      </Text>
+      {plans.map((plan) => (
+        <DeviceBlock
+          key={plan.slug}
+          plan={plan}
+          save={!noSave.has(plan.slug)}
+          onSave={() => toggleSave(plan.slug)}
+        />
+      ))}
+      <Group gap="sm">
+        <Text size="sm">{t("page.review.on_failure")}</Text>
+        <SegmentedControl
+          aria-label={t("page.review.on_failure")}
+          data={[
+            { value: "stop", label: t("page.review.stop") },
+            { value: "go-on", label: t("page.review.go_on") },
+          ]}
+          value={onFailure}
+          onChange={(picked) => setOnFailure(picked === "go-on" ? "go-on" : "stop")}
+          data-testid="on-failure"
+        />
+      </Group>
+      <Blocked stopped={stopped} asked={asked} />
+      <Group justify="space-between">
+        <Button
+          variant="subtle"
+          leftSection={<IconTrash size={17} aria-hidden />}
+          onClick={() => staged.drop(rows.map(({ change }) => keyOf(change.device, change.address)))}
+          data-testid="drop-all"
+        >
+          {t("page.review.drop_all")}
+        </Button>
+        <Group>
+          <Button variant="default" onClick={onClose} data-autofocus>
+            {t("page.review.back")}
+          </Button>
+          <HoldButton
+            tone="accent"
+            hint={t("page.hold")}
+            disabled={stopped > 0 || asked > 0 || write.isPending}
+            onHeld={() => write.mutate({ changes: rows.map((row) => row.change), save, onFailure })}
+            testId="write-hold"
+          >
+            {t("page.review.write", { count: rows.length, devices: plans.length })}
+          </HoldButton>
+        </Group>
+      </Group>
+    </Stack>
+  );
+}
+
+function usePlans(places: readonly Place[]): DevicePlan[] {
+  const { changes } = useStaged();
+  const { role } = useBenchOfTable();
+  const contexts = useContexts(places);
+  const bySlug = new Map<string, Change[]>();
+  for (const change of changes.values())
+    bySlug.set(change.device, [...(bySlug.get(change.device) ?? []), change]);
+  return [...bySlug].map(([slug, list]) => {
+    const context = contexts.get(slug);
+    const rows = context
+      ? planOf(list, groundOf(context, role))
+      : list.map((change) => ({ change, findings: [] }));
+    return { slug, context, rows };
+  });
+}
+
+function Nothing({ onClose }: { onClose: () => void }) {
+  const t = useTexts();
+  return (
+    <Stack>
+      <Text>{t("page.review.nothing")}</Text>
+      <Group justify="flex-end">
+        <Button variant="default" onClick={onClose}>
+          {t("page.close")}
+        </Button>
+      </Group>
+    </Stack>
+  );
+}
+
+function Blocked({ stopped, asked }: { stopped: number; asked: number }) {
+  const t = useTexts();
+  if (stopped === 0 && asked === 0) return null;
+  return (
+    <Alert color={stopped > 0 ? "red" : "orange"} variant="light" p="sm" data-testid="review-blocked">
+      {stopped > 0 && <div>{t("page.review.stopped", { count: stopped })}</div>}
+      {asked > 0 && <div>{t("page.review.asked", { count: asked })}</div>}
+    </Alert>
+  );
+}
+
+function DeviceBlock({ plan, save, onSave }: { plan: DevicePlan; save: boolean; onSave: () => void }) {
+  const t = useTexts();
+  const name = useDeviceName()(plan.slug);
+  const silent = useSilent(plan.slug);
+  // What RAM holds is compared as it changes, also of devices that the table does not show.
+  useWatchDevice(plan.slug);
+  useDeviceVersion(plan.slug);
+  return (
+    <section className={classes.reviewDevice} data-testid={`review-${plan.slug}`}>
+      <header>
+        <h3>{name}</h3>
+        <span className="dim">{t("page.review.rows", { count: plan.rows.length })}</span>
+        <Checkbox
+          label={t("page.review.save_after")}
+          checked={save}
+          onChange={onSave}
+          data-testid={`save-after-${plan.slug}`}
+        />
+      </header>
+      {silent && (
+        <Alert color="orange" p="xs">
+          {t("page.write.silent")}
+        </Alert>
+      )}
+      <ol>
+        {plan.rows.map((row) => (
+          <ReviewRow key={row.change.address} row={row} context={plan.context} />
+        ))}
+      </ol>
+    </section>
+  );
+}
+
+function ReviewRow({ row, context }: { row: PlannedRow; context: DeviceContext | undefined }) {
+  const t = useTexts();
+  const { change, findings } = row;
+  const key = keyOf(change.device, change.address);
+  const entry = context && entriesOf(context.doc).get(change.address);
+  if (!context || !entry) {
+    return (
+      <li className={classes.reviewRow}>
+        {change.address} {t("page.review.gone")}
+      </li>
+    );
+  }
+  const line = (raw: Raw | null, of: DeviceContext) => (raw === null ? "–" : lineOf(shownOf(entry, raw, of)));
+  const conflict = findings.find((one) => one.kind === FindingKind.Conflict);
+  return (
+    <li className={classes.reviewRow} data-testid={`review-row-${change.address}`}>
+      <div className={classes.reviewLine}>
+        <span className={classes.address}>{change.address}</span>
+        <span className={classes.reviewName}>{titleOf(entry, t)}</span>
+        <span className={classes.reviewValues}>
+          <s>{line(context.lookup(change.address), context)}</s>
+          <IconArrowRight size={15} aria-hidden />
+          <b>{line(change.raw, plannedContext(context))}</b>
+        </span>
+        <ActionIcon
+          variant="subtle"
+          aria-label={t("page.review.drop", { name: titleOf(entry, t) })}
+          onClick={() => staged.drop([key])}
+          data-testid={`drop-${change.address}`}
+        >
+          <IconTrash size={17} aria-hidden />
+        </ActionIcon>
+      </div>
+      <FindingList findings={findings} entry={entry} device={context} />
+      {change.refused && (
+        <p className={classes.refusedBefore}>
+          ✕ {t("page.review.refused_before", { reason: reasonOf(change.refused, t) })}
+        </p>
+      )}
+      {conflict && (
+        <Button
+          variant="default"
+          onClick={() => staged.confirm(key, conflict.details.found as Raw)}
+          data-testid={`confirm-${change.address}`}
+        >
+          {t("page.review.confirm")}
+        </Button>
+      )}
+    </li>
+  );
+}
