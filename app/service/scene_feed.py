@@ -8,8 +8,9 @@ import logging
 from collections.abc import AsyncIterator
 from typing import Final
 
-from app.scene.hub import BLADES, BladePose, BladeState, HubScene
+from app.scene.hub import BLADES, BladePose, BladeState, HubScene, RotorPose
 from app.service.bench import Bench
+from app.service.rotor_view import NOBODY, RotorLine, rotor_line
 from app.service.views import AxisLine, axis_lines
 
 log = logging.getLogger(__name__)
@@ -24,6 +25,13 @@ _LOOK_AGAIN_S: Final = 0.25
 def pose(line: AxisLine) -> BladePose:
     """How a blade looks: its last angle, coloured by its state; grey where that is unknown or old."""
     return BladePose(line.position_deg, BladeState(line.look), line.demand_deg)
+
+
+def rotor_pose(line: RotorLine) -> RotorPose:
+    """How the rotor stands: where it was seen last; a wind that is old is not shown as one that blows."""
+    if line.stale:
+        return RotorPose(line.azimuth_deg)
+    return RotorPose(line.azimuth_deg, line.wind_mps, line.wind_deg)
 
 
 @contextlib.asynccontextmanager
@@ -76,14 +84,17 @@ class SceneFeed:
         seen = (self._bench.epoch, -1 if shown is None else shown.live.version)
         if not self._watched or seen != self._seen or now_s - self._looked_s >= _LOOK_AGAIN_S:
             self._watched, self._seen, self._looked_s = True, seen, now_s
-            self._scene.show(self._poses())
+            self._show()
         return True
 
-    def _poses(self) -> dict[int, BladePose]:
-        """All blades now; nothing is known of a blade that is not connected."""
-        poses = dict.fromkeys(BLADES, BladePose(None, BladeState.UNKNOWN))
+    def _show(self) -> None:
+        """All now; nothing is known of what is not connected."""
+        poses, rotor = dict.fromkeys(BLADES, BladePose(None, BladeState.UNKNOWN)), NOBODY
         shown = self._bench.connection
         if shown is not None:
+            now_ns = shown.stamper()
             targets = {target.slug: target for target in shown.targets}
-            poses |= {line.blade: pose(line) for line in axis_lines(shown.turbine, targets, shown.stamper())}
-        return poses
+            poses |= {line.blade: pose(line) for line in axis_lines(shown.turbine, targets, now_ns)}
+            rotor = rotor_line(shown.live, now_ns)
+        self._scene.show(poses)
+        self._scene.show_rotor(rotor_pose(rotor))

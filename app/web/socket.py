@@ -22,6 +22,7 @@ from app.service.connection import Connection
 from app.service.devices import Target
 from app.service.journal import Entry
 from app.service.link import LinkLine, bench_line, link_urgent
+from app.service.rotor_view import NOBODY, rotor_line
 from app.service.trace_query import TraceQuery
 from app.service.trace_tail import PERIOD_S as TRACE_S
 from app.service.trace_tail import TraceTail
@@ -47,6 +48,7 @@ from app.web.models import (
     HelloMessage,
     LinkMessage,
     NodesMessage,
+    RotorMessage,
     ServerMessage,
     TraceMessage,
     ValuesData,
@@ -60,6 +62,7 @@ log = logging.getLogger(__name__)
 TICK_S: Final = 0.01
 """Window in which changes are collected: the most that a change waits here."""
 HEARTBEAT_S: Final = 0.25
+ROTOR_S: Final = 0.5
 AXES_S: Final = 0.02
 AXES_LOOK_AGAIN_S: Final = 0.2
 AXES_AT_LEAST_S: Final = 1.0
@@ -94,6 +97,7 @@ class Feed:
         self._link: LinkLine | None = None
         self._axes: tuple[AxisLine, ...] = ()
         self._axes_cursor = -1
+        self._rotor = NOBODY
         self._nodes_urgent: tuple[Any, ...] = ()
         self._nodes_changed = False
         self._told_events = False
@@ -142,6 +146,8 @@ class Feed:
             yield from self._nodes_due(now_s)
         if "axes" in self._topics:
             yield from self._axes_due(now_s)
+        if "rotor" in self._topics:
+            yield from self._rotor_due(now_s)
         yield from self._events_due(changes)
         if "trace" in self._topics:
             yield from self._trace_due(now_s)
@@ -211,6 +217,15 @@ class Feed:
             self._axes = lines
             self._next["axes at least"] = now_s + AXES_AT_LEAST_S
             yield AxesMessage(seq=self._count(), t_ns=now_ns, data=lines)
+
+    def _rotor_due(self, now_s: float) -> Iterator[ServerMessage]:
+        if not self._passed("rotor", now_s, ROTOR_S):
+            return
+        now_ns = self._bench.stamper()
+        line = NOBODY if self._connection is None else rotor_line(self._connection.live, now_ns)
+        if line != self._rotor or "rotor" in self._fresh:
+            self._rotor = line
+            yield RotorMessage(seq=self._count(), t_ns=now_ns, data=line)
 
     def _link_due(self, now_s: float) -> Iterator[ServerMessage]:
         if not self._passed("look at link", now_s, LINK_LOOK_S):

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, StrictFloat, StrictInt, StrictStr
 
 from app.service.link import LinkLine, Mode
+from app.service.rotor_view import RotorLine
 from app.service.trace_tail import TraceBatch
 from app.service.views import AxisLine, EventLine, NodeLine, RawJson, ValueCell
 from app.web.models.trace import TraceFilter
@@ -281,6 +282,13 @@ class AxesMessage(_Envelope):
     data: tuple[AxisLine, ...]
 
 
+class RotorMessage(_Envelope):
+    """Topic ``rotor``: rotor and wind, where they changed, at most twice a second."""
+
+    type: Literal["rotor"] = "rotor"
+    data: RotorLine
+
+
 class ValuesMessage(_Envelope):
     """Topic ``values:<slug>``: all that is known, then what changed."""
 
@@ -309,6 +317,7 @@ ServerMessage = Annotated[
     | LinkMessage
     | NodesMessage
     | AxesMessage
+    | RotorMessage
     | ValuesMessage
     | EventMessage
     | TraceMessage,

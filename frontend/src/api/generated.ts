@@ -2568,6 +2568,55 @@ export interface components {
             took_s: number;
         };
         /**
+         * RotorLine
+         * @description Rotor and wind as a twin told them last, at ``t_ns``; all None where nobody tells them.
+         *
+         *     Azimuth of blade 1 in degrees, 0 upwards, clockwise seen from upwind. ``wind_deg`` is where the wind comes from,
+         *     from the nacelle's direction, positive clockwise seen from above. ``stale``: older than a second.
+         */
+        RotorLine: {
+            /** Azimuth Deg */
+            azimuth_deg: number | null;
+            /** Rotor Rpm */
+            rotor_rpm: number | null;
+            /** Stale */
+            stale: boolean;
+            /** T Ns */
+            t_ns: number | null;
+            /** Wind Deg */
+            wind_deg: number | null;
+            /** Wind Mps */
+            wind_mps: number | null;
+        };
+        /**
+         * RotorMessage
+         * @description Topic ``rotor``: rotor and wind, where they changed, at most twice a second.
+         */
+        RotorMessage: {
+            /**
+             * Ctx
+             * @default live
+             * @constant
+             */
+            ctx: "live";
+            data: components["schemas"]["RotorLine"];
+            /** Seq */
+            seq: number;
+            /** T Ns */
+            t_ns: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            type: "rotor";
+            /**
+             * V
+             * @default 1
+             * @constant
+             */
+            v: 1;
+        };
+        /**
          * SaveDone
          * @description The device acknowledged the save.
          */
@@ -2673,7 +2722,7 @@ export interface components {
             /** Connection */
             connection: string;
         };
-        ServerMessage: components["schemas"]["HelloMessage"] | components["schemas"]["BenchMessage"] | components["schemas"]["HeartbeatMessage"] | components["schemas"]["LinkMessage"] | components["schemas"]["NodesMessage"] | components["schemas"]["AxesMessage"] | components["schemas"]["ValuesMessage"] | components["schemas"]["EventMessage"] | components["schemas"]["TraceMessage"];
+        ServerMessage: components["schemas"]["HelloMessage"] | components["schemas"]["BenchMessage"] | components["schemas"]["HeartbeatMessage"] | components["schemas"]["LinkMessage"] | components["schemas"]["NodesMessage"] | components["schemas"]["AxesMessage"] | components["schemas"]["RotorMessage"] | components["schemas"]["ValuesMessage"] | components["schemas"]["EventMessage"] | components["schemas"]["TraceMessage"];
         /**
          * Session
          * @description Who is served, and in which languages. ``user`` is null where a launch token opened the session.
