@@ -15,6 +15,7 @@ from app.wire.frame import Can, Frame
 from app.wire.records import (
     BootUpSeen,
     EmcySeen,
+    EnvironmentSeen,
     GapSeen,
     MalformedSeen,
     NmtCommandSeen,
@@ -233,6 +234,17 @@ def _boot_up(_seen: BootUpSeen, _row: TraceRow, _namer: Namer) -> _Notes:
     yield TraceNote("trace.note.boot_up", {})
 
 
+def _environment(seen: EnvironmentSeen, _row: TraceRow, _namer: Namer) -> _Notes:
+    azimuth_deg, rotor_rpm, wind_mps, wind_deg = seen.environment
+    details = {
+        "azimuth": f"{azimuth_deg:.1f}",
+        "rpm": f"{rotor_rpm:.2f}",
+        "wind": f"{wind_mps:.1f}",
+        "from": f"{wind_deg:.1f}",
+    }
+    yield TraceNote("trace.note.environment", details)
+
+
 def _gap(seen: GapSeen, _row: TraceRow, _namer: Namer) -> _Notes:
     yield TraceNote("trace.note.gap", {"reason_key": seen.reason})
 
@@ -256,6 +268,7 @@ def _sdo(seen: SdoSeen, row: TraceRow, _namer: Namer) -> _Notes:
 
 _NOTES: Final[Mapping[type, Callable[[Any, TraceRow, Namer], _Notes]]] = {
     EmcySeen: _emcy,
+    EnvironmentSeen: _environment,
     NmtCommandSeen: _nmt,
     SyncSeen: _sync,
     StateSeen: _state,

@@ -155,6 +155,7 @@ class CanOpenDecoder:
             self._on_heartbeat: Service.HEARTBEAT,
             self._on_nmt: Service.NMT,
             self._on_sync: Service.SYNC,
+            self._on_environment: Service.TWIN,
         }[handler]
         return Speaker(service, 0 if target is None else target.number)
 

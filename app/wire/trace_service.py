@@ -33,6 +33,8 @@ class Service(Enum):
     HEARTBEAT = "heartbeat"
     LSS = "lss"
     ERROR = "error"
+    TWIN = "twin"
+    """Rotor and wind, as a twin tells them (``app.wire.twin_environment``)."""
     GAP = "gap"
     UNKNOWN = "unknown"
 

@@ -1,11 +1,11 @@
-import { useVirtualizer } from "@tanstack/react-virtual";
-import { type KeyboardEvent, type ReactNode, useEffect, useLayoutEffect, useRef } from "react";
+import { type KeyboardEvent, type ReactNode, useEffect, useLayoutEffect, useRef, useState } from "react";
 import type { TraceLine } from "../../api/trace";
 import { useTexts } from "../../texts/texts";
 import classes from "./Bus.module.css";
 import { TraceRow } from "./TraceRow";
 
 const ROW_PX = 21;
+const HEAD_PX = 26;
 const OVERSCAN = 6;
 const NEAR_PX = 2 * ROW_PX;
 const COLUMNS = ["time", "direction", "id", "node", "service", "data", "meaning"];
@@ -24,64 +24,67 @@ interface Props {
   children: ReactNode;
 }
 
-/** The rows, of which only those in sight are in the document. Arrows move, Enter picks, Home and End go far. */
+/** The rows, of which only those in sight are in the document. Arrows move, Home and End go far. */
 export function TraceTable(props: Props) {
   const { rows, following, picked, query, onPick, onLeave, onOlder, onNewer, children } = props;
   const t = useTexts();
   const scroller = useRef<HTMLDivElement>(null);
-  const head = useRef<{ first: number | undefined; count: number }>({ first: undefined, count: 0 });
-  const ours = useRef(false);
-  const virtual = useVirtualizer({
-    count: rows.length,
-    getScrollElement: () => scroller.current,
-    estimateSize: () => ROW_PX,
-    overscan: OVERSCAN,
-    getItemKey: (index) => rows[index]?.t_ns ?? index,
+  const [top, setTop] = useState(0);
+  const height = useHeight(scroller);
+  const before = useRef<{ first: number | undefined; top: number; total: number }>({
+    first: undefined,
+    top: 0,
+    total: 0,
   });
+  const inSight = Math.ceil(height / ROW_PX);
+  // The newest rows are drawn at once, without waiting for the scroll that shows them.
+  const from = Math.max(0, (following ? rows.length - inSight : Math.floor(top / ROW_PX)) - OVERSCAN);
+  const to = Math.min(rows.length, from + inSight + 2 * OVERSCAN);
 
-  // Rows that are put before the first one must not move those that are being read.
   useLayoutEffect(() => {
     const at = scroller.current;
-    const before = head.current;
-    head.current = { first: rows[0]?.t_ns, count: rows.length };
     if (!at) return;
+    const { first } = before.current;
     if (following) {
-      ours.current = true;
       at.scrollTop = at.scrollHeight;
-      return;
+    } else if (first !== undefined && first !== rows[0]?.t_ns) {
+      // Rows that are put before the first one must not move those that are being read.
+      const moved = rows.findIndex((row) => row.t_ns === first);
+      if (moved > 0) at.scrollTop += moved * ROW_PX;
     }
-    if (before.first === undefined || before.first === rows[0]?.t_ns) return;
-    const moved = rows.findIndex((row) => row.t_ns === before.first);
-    if (moved > 0) at.scrollTop += moved * ROW_PX;
+    before.current = { first: rows[0]?.t_ns, top: at.scrollTop, total: at.scrollHeight };
   }, [rows, following]);
 
+  const index = picked === null ? -1 : rows.findIndex((row) => row.t_ns === picked);
+  const known = index >= 0;
   useEffect(() => {
-    if (picked === null) return;
-    const at = rows.findIndex((row) => row.t_ns === picked);
-    if (at >= 0) virtual.scrollToIndex(at, { align: isSeen(virtual, at) ? "auto" : "center" });
-    // Only a new choice, or its arrival, moves the table.
+    const at = scroller.current;
+    if (!at || !known) return;
+    reveal(at, index);
+    // Only another choice, or its arrival, moves the table.
     // eslint-disable-next-line react-hooks/exhaustive-deps
-  }, [picked, rows.length > 0 && rows.some((row) => row.t_ns === picked)]);
+  }, [picked, known]);
 
   const onScroll = () => {
     const at = scroller.current;
     if (!at) return;
-    if (ours.current) {
-      ours.current = false;
+    setTop(at.scrollTop);
+    const below = at.scrollHeight - at.scrollTop - at.clientHeight;
+    if (following) {
+      // Ours only go down: up goes a person.
+      const { top: was, total } = before.current;
+      if (at.scrollTop < was - NEAR_PX && at.scrollHeight >= total && below > NEAR_PX) onLeave();
       return;
     }
-    const below = at.scrollHeight - at.scrollTop - at.clientHeight;
-    if (following && below > NEAR_PX) onLeave();
-    if (!following && at.scrollTop < NEAR_PX) onOlder();
-    if (!following && below < NEAR_PX) onNewer?.();
+    if (at.scrollTop < NEAR_PX) onOlder();
+    if (below < NEAR_PX) onNewer?.();
   };
 
   const onKeyDown = (event: KeyboardEvent) => {
-    const at = rows.findIndex((row) => row.t_ns === picked);
-    const to = target(event.key, at, rows.length);
-    if (to === null) return;
+    const next = target(event.key, index, rows.length);
+    if (next === null) return;
     event.preventDefault();
-    onPick(to < 0 ? null : (rows[to]?.t_ns ?? null));
+    onPick(rows[next]?.t_ns ?? null);
   };
 
   return (
@@ -103,35 +106,50 @@ export function TraceTable(props: Props) {
           </span>
         ))}
       </div>
-      <div role="rowgroup" className={classes.lines} style={{ height: virtual.getTotalSize() }}>
-        {virtual.getVirtualItems().map((item) => {
-          const line = rows[item.index];
-          return line ? (
-            <TraceRow
-              key={item.key}
-              line={line}
-              top={item.start}
-              index={item.index}
-              picked={line.t_ns === picked}
-              query={query}
-              onPick={onPick}
-            />
-          ) : null;
-        })}
+      <div role="rowgroup" className={classes.lines} style={{ height: rows.length * ROW_PX }}>
+        {rows.slice(from, to).map((line, at) => (
+          <TraceRow
+            key={line.t_ns}
+            line={line}
+            top={(from + at) * ROW_PX}
+            index={from + at}
+            picked={line.t_ns === picked}
+            query={query}
+            onPick={onPick}
+          />
+        ))}
       </div>
       {children}
     </div>
   );
 }
 
-function isSeen(virtual: { range: { startIndex: number; endIndex: number } | null }, at: number): boolean {
-  const range = virtual.range;
-  return range !== null && at > range.startIndex && at < range.endIndex;
+/** Height of what is in sight, px. */
+function useHeight(of: React.RefObject<HTMLDivElement | null>): number {
+  const [height, setHeight] = useState(ROW_PX);
+  useLayoutEffect(() => {
+    const at = of.current;
+    if (!at) return;
+    const observer = new ResizeObserver(() => setHeight(at.clientHeight));
+    observer.observe(at);
+    return () => observer.disconnect();
+  }, [of]);
+  return height;
+}
+
+/** Bring a row into sight: to the middle where it was far, else as little as needed. */
+function reveal(at: HTMLDivElement, index: number): void {
+  const y = index * ROW_PX;
+  const room = at.clientHeight - HEAD_PX;
+  if (y >= at.scrollTop && y + ROW_PX <= at.scrollTop + room) return;
+  const near = y > at.scrollTop - room / 2 && y < at.scrollTop + 1.5 * room;
+  if (!near) at.scrollTop = y - room / 2;
+  else at.scrollTop = y < at.scrollTop ? y : y + ROW_PX - room;
 }
 
 const PAGE = 20;
 
-/** Row that a key goes to; -1 closes, null: the key means nothing here. */
+/** Row that a key goes to; null: the key means nothing here. */
 function target(key: string, at: number, count: number): number | null {
   if (count === 0) return null;
   const from = at < 0 ? count - 1 : at;

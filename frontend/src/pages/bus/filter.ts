@@ -10,7 +10,7 @@ export const GROUPS: Record<string, readonly string[]> = {
   heartbeat: ["heartbeat"],
   emcy: ["emcy"],
   sync: ["sync", "time"],
-  other: ["lss", "error", "unknown"],
+  other: ["lss", "error", "twin", "unknown"],
 };
 
 export const listOf = (text: string | undefined): string[] => (text ?? "").split(",").filter(Boolean);
