@@ -1,13 +1,14 @@
 # make run    the demo: twins, server and page      make test   everything that must pass
 # make check  the fast loop (format, lint, types, layers, generated files)
 # make bench  all benchmarks                        make soak   the long figures
+# make wheel  the package with the page inside      make screenshots   pictures of every room, for README and docs
 PYTHON ?= python3
 VENV   ?= .venv
 BIN    := $(VENV)/bin
 PY     := $(BIN)/python
 ROOT   := $(if $(filter 0,$(shell id -u)),,sudo)
 
-.PHONY: run test check bench soak setup system page lock generate clean
+.PHONY: run test check bench soak setup system page wheel screenshots lock generate clean
 
 run: $(VENV)/.ready frontend/dist/index.html
 	$(BIN)/hubside demo
@@ -56,6 +57,14 @@ frontend/dist/index.html: frontend/node_modules/.ready $(PAGE)
 	cd frontend && npm run --silent build
 
 page: frontend/dist/index.html
+
+# One file that needs no Node: pip install dist/hubside-*.whl && hubside demo
+wheel: $(VENV)/.ready frontend/dist/index.html
+	rm -rf dist
+	$(PY) -m build --wheel --no-isolation --outdir dist .
+
+screenshots: setup
+	$(PY) -m docs.make_screenshots
 
 # Everything that is generated from something else; `make check` fails where it is out of date.
 generate: $(VENV)/.ready frontend/node_modules/.ready
