@@ -13,6 +13,7 @@ import type { NumberedEvent } from "../live/store";
 import { type Translate, useTexts } from "../texts/texts";
 import { useDeviceName } from "../ui/devices";
 import { timeOfDay } from "../ui/format";
+import { FrameLink } from "./FrameLink";
 import classes from "./Frame.module.css";
 import { usePageSearch } from "./search";
 
@@ -103,7 +104,9 @@ function EventTable({ events }: { events: readonly NumberedEvent[] }) {
                 <Severity severity={event.severity} />
               </td>
               <td>{device}</td>
-              <td>{text}</td>
+              <td>
+                {text} <FrameLink tNs={event.t_ns} />
+              </td>
             </tr>
           ))}
           {shown.length === 0 && (

@@ -1,7 +1,7 @@
 /** Keeps the trace of the room running by the filter in the URL, and fetches what lies outside of it. */
 import { useMutation } from "@tanstack/react-query";
 import { useCallback, useEffect, useMemo, useRef } from "react";
-import { fetchFrames, type Side, type TraceFilter } from "../../api/trace";
+import { digitsOf, fetchFrames, type Side, type TraceFilter, type TraceLine } from "../../api/trace";
 import { usePageSearch } from "../../frame/search";
 import { frames, store, useBench, useFrames, watchTrace } from "../../live/live";
 import { notify } from "../../ui/notices";
@@ -32,7 +32,14 @@ export function useTrace() {
 
   const { mutate, isPending } = useMutation({
     mutationFn: ({ side, tNs }: Ask) => fetchFrames(side, tNs, filter, PAGE_ROWS),
-    onSuccess: (page, { side }) => frames.merge(page, WHERE[side]),
+    onSuccess: (page, { side, tNs }) => {
+      frames.merge(page, WHERE[side]);
+      if (side !== "around") return;
+      // An event of the journal is no frame: the nearest one is shown.
+      const near = nearest(page.rows, tNs);
+      if (near === undefined) notify({ tone: "warning", title: t("trace.page.not_found"), lines: [] });
+      else if (near.t_ns !== tNs) update({ frame: digitsOf(near.t_ns) });
+    },
     onError: (error) => {
       const story = storyOf(error, t);
       notify({ tone: "error", title: t("trace.page.failed"), lines: [story.happened, story.next] });
@@ -84,4 +91,11 @@ export function useTrace() {
     newer: () => edge("after", view.rows.at(-1)?.t_ns),
     wanted: Number.isFinite(wanted) ? wanted : null,
   };
+}
+
+function nearest(rows: readonly TraceLine[], tNs: number): TraceLine | undefined {
+  let best: TraceLine | undefined;
+  for (const row of rows)
+    if (best === undefined || Math.abs(row.t_ns - tNs) < Math.abs(best.t_ns - tNs)) best = row;
+  return best;
 }
