@@ -278,12 +278,12 @@ class PollItem(BaseModel):
 
 
 class PollDevice(BaseModel):
-    """What is read of one kind of device."""
+    """What is read of one kind of device, and what usually would be."""
 
     description_id: str
     name: str
-    usual: bool
     items: list[PollItem]
+    usual: list[PollItem]
 
 
 class PollBus(BaseModel):

@@ -396,8 +396,8 @@ def _poll_device(description: Description, plan: PollPlan) -> PollDevice:
     return PollDevice(
         description_id=description.id,
         name=description.name,
-        usual=dict(items) == dict(usual),
         items=[item(address, rate) for address, rate in items.items() if address in description.entries],
+        usual=[item(address, rate) for address, rate in usual.items()],
     )
 
 
