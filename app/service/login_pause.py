@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -36,7 +37,7 @@ class LoginPause:
         failures = self._failures.get((name_key, address))
         left_s = 0.0 if failures is None else failures.until_s - self._monotonic_s()
         if left_s > 0:
-            raise LoginPausedError(retry_after_s=round(left_s + 0.5))
+            raise LoginPausedError(retry_after_s=math.ceil(left_s))
 
     def failed(self, name_key: str, address: str) -> None:
         """A login failed, or is being tried: a success takes it back."""

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import re
 import ssl
 from dataclasses import dataclass
 from ipaddress import IPv4Address, IPv6Address, ip_address
 from pathlib import Path
+from typing import Final
 
 from app.errors import UsageError
 from app.web.guard import LOOPBACK_NAMES, Reach
 
 Ip = IPv4Address | IPv6Address
-LOOPBACK: Ip = IPv4Address("127.0.0.1")
+LOOPBACK: Final = IPv4Address("127.0.0.1")
+_LISTEN: Final = re.compile(
+    r"(?:\[(?P<six>[^\]]+)\]|(?P<other>[^:\[\]]+))(?::(?P<port>[0-9]{1,5}))?\Z|(?P<bare_six>[^\[\]]*:[^\[\]]*:[^\[\]]*)\Z"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,21 +80,17 @@ def parse_listen(text: str, port: int) -> tuple[Ip, int]:
 
     Raises UsageError.
     """
-    host, named = text, ""
-    if text.startswith("["):
-        host, _, rest = text[1:].partition("]")
-        if rest and not rest.startswith(":"):
-            raise _no_address(text)
-        named = rest[1:]
-    elif text.count(":") == 1:
-        host, named = text.split(":")
-    if named and not (named.isascii() and named.isdecimal() and int(named) <= 65535):
+    match = _LISTEN.match(text)
+    if match is None:
         raise _no_address(text)
+    host, named = match["six"] or match["bare_six"] or match["other"], match["port"]
     try:
         address = LOOPBACK if host == "localhost" else ip_address(host)
     except ValueError as error:
         raise _no_address(text) from error
-    return address, int(named) if named else port
+    if named is not None and int(named) > 65535:
+        raise _no_address(text)
+    return address, port if named is None else int(named)
 
 
 def host_of(address: Ip) -> str:
