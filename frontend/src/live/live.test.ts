@@ -3,7 +3,6 @@ import type { AxisData, ServerMessage, ValueData } from "../api/types";
 import { Backoff } from "./backoff";
 import { DeafnessTimer } from "./deafness";
 import { LiveStore } from "./store";
-import { Trace } from "./trace";
 
 describe("deafness", () => {
   it("comes after one second without a message, and goes with the next", () => {
@@ -140,24 +139,6 @@ describe("store", () => {
   it("leaves a gap in the trace while the position is stale", () => {
     send("axes", [axis(80)], 1e9);
     send("axes", [axis(80, true)], 1.1e9);
-    expect(store.traces.get(1)?.columns()[1]).toEqual([80, null]);
-  });
-});
-
-describe("trace", () => {
-  it("keeps a minute", () => {
-    const trace = new Trace();
-    for (let tenth = 0; tenth <= 700; tenth += 1) trace.push(tenth / 10, tenth, null);
-    const [times] = trace.columns();
-    expect(times[0]).toBe(10);
-    expect(times.at(-1)).toBe(70);
-  });
-
-  it("breaks the line where messages were missing, and refuses to go back", () => {
-    const trace = new Trace();
-    trace.push(0, 1, 1);
-    trace.push(5, 2, 2);
-    trace.push(4, 3, 3);
-    expect(trace.columns()[1]).toEqual([1, null, 2]);
+    expect(store.traces.get(1)?.columns(60).positions).toEqual([80, null]);
   });
 });

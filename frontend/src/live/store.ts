@@ -2,8 +2,8 @@
  * What the page knows of the bench, fed by the socket alone.
  *
  * Messages are taken in at once but shown coalesced: listeners of a topic are told at most once a tick of `schedule`
- * (an animation frame in the browser), however many messages came. Topics: "hearing", "bench", "link", "nodes", "axes", "events",
- * "device:<slug>" and "value:<slug>/<address>".
+ * (an animation frame in the browser), however many messages came. Topics: "hearing", "bench", "link", "nodes", "axes",
+ * "rotor", "events", "device:<slug>" and "value:<slug>/<address>".
  */
 import type {
   AxisData,
@@ -11,6 +11,7 @@ import type {
   EventData,
   LinkData,
   NodeData,
+  RotorData,
   ServerMessage,
   ValueData,
   ValuesData,
@@ -44,6 +45,7 @@ export class LiveStore {
   link: LinkData | null = null;
   nodes: ReadonlyMap<string, NodeData> = new Map();
   axes: ReadonlyMap<number, AxisData> = new Map();
+  rotor: RotorData | null = null;
   events: readonly NumberedEvent[] = [];
   loadHistory: readonly number[] = [];
   readonly traces = new Map<number, Trace>();
@@ -114,6 +116,9 @@ export class LiveStore {
         return this.mark("nodes");
       case "axes":
         return this.applyAxes(message.data, message.t_ns);
+      case "rotor":
+        this.rotor = message.data;
+        return this.mark("rotor");
       case "values":
         return this.applyValues(message.data);
       case "event":
@@ -129,8 +134,9 @@ export class LiveStore {
     if (!another) return;
     this.nodes = new Map();
     this.axes = new Map();
+    this.rotor = null;
     this.traces.clear();
-    for (const topic of ["nodes", "axes"]) this.mark(topic);
+    for (const topic of ["nodes", "axes", "rotor"]) this.mark(topic);
     for (const device of [...this.devices.keys()]) this.applyValues({ device, full: true, values: {} });
   }
 
@@ -141,7 +147,13 @@ export class LiveStore {
       this.traces.set(axis.blade, trace);
       // A stale position is a gap in the trace, never the last value drawn on.
       const demand = axis.stale || !followsDemand(axis) ? null : axis.demand_deg;
-      trace.push(tNs / 1e9, axis.stale ? null : axis.position_deg, demand);
+      const known = <T>(number: T | null) => (axis.stale ? null : number);
+      trace.push(tNs / 1e9, {
+        positionDeg: known(axis.position_deg),
+        demandDeg: demand,
+        velocityDps: known(axis.velocity_dps),
+        currentPct: known(axis.current_pct),
+      });
     }
     this.mark("axes");
   }

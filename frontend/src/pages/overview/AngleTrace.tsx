@@ -22,7 +22,10 @@ export function AngleTrace({ blade, label }: { blade: number; label: string }) {
   useEffect(() => {
     const element = holder.current;
     if (!element) return;
-    const columns = () => store.traces.get(blade)?.columns() ?? [[], [], []];
+    const columns = (): UPlot.AlignedData => {
+      const found = store.traces.get(blade)?.columns(TRACE_S);
+      return found ? [found.times, found.positions, found.demands] : [[], [], []];
+    };
     const plot = new UPlot(
       options(element, (text) => localise(text, language)),
       columns(),

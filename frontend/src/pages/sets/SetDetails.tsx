@@ -65,11 +65,6 @@ function Content({ doc }: { doc: SetDoc }) {
   const shown = search.compare === "different" ? different : rows;
   return (
     <>
-      <div className={room.columns}>
-        <Head doc={doc} />
-        <Identity doc={doc} />
-        <Unread doc={doc} />
-      </div>
       <div className={room.detailsHead} style={{ padding: "8px 0", border: 0 }}>
         {here ? (
           <>
@@ -87,6 +82,14 @@ function Content({ doc }: { doc: SetDoc }) {
           <span className="dim">{t("page.sets.not_here", { device })}</span>
         )}
       </div>
+      <details className={classes.facts} data-testid="set-facts">
+        <summary>{t("page.sets.facts")}</summary>
+        <div className={room.columns}>
+          <Head doc={doc} />
+          <Identity doc={doc} />
+          <Unread doc={doc} />
+        </div>
+      </details>
       <ValueTable
         rows={shown}
         description={description}
