@@ -15,8 +15,8 @@ from app.scene.solids import Vector, rotation
 
 _HERE: Final = Path(__file__).parent
 _SHAFT: Final[Vector] = (1.0, 0.0, 0.0)
-_LABEL_M: Final = ROOT_M + (TIP_M - ROOT_M) * 0.62
-"""Where along a blade its label belongs."""
+_LABEL_M: Final = ROOT_M + (TIP_M - ROOT_M) * 0.97
+"""Where along a blade its label belongs: at the tip, where it hides least."""
 
 
 def bare_page(page: bytes) -> bytes:

@@ -172,8 +172,8 @@ class HubScene:
             known = pose.wind_mps is not None and pose.wind_deg is not None
             if pose.wind_mps is not None and pose.wind_deg is not None:
                 self._arrow.scale = max(1.0, pose.wind_mps * _WIND_LENGTH_M)
-                # Wind from the right (positive, seen from above) blows to the left: +y.
-                self._wind.wxyz = quaternion(_UP, pose.wind_deg)
+                # Who stands on the nacelle and looks upwind has +y at the right, from where positive wind comes.
+                self._wind.wxyz = quaternion(_UP, -pose.wind_deg)
             if self._wind.visible is not known:
                 self._wind.visible = known
 

@@ -68,7 +68,9 @@ def label_place(angle_deg: float) -> Vector:
     """Where the name of a mark belongs."""
     x, y, _ = direction(angle_deg)
     reach = _RADIUS_M + 0.1
-    return (x * reach, y * reach, COLLAR_M[0] - 0.06)
+    # 90 and 95 degrees are too close for two names in a row.
+    height = COLLAR_M[1] + 0.75 if angle_deg > FEATHER_DEG else COLLAR_M[0] - 0.2
+    return (x * reach, y * reach, height)
 
 
 def _tick(angle_deg: float, width_m: float, length_m: float) -> Mesh:

@@ -18,6 +18,8 @@ log = logging.getLogger(__name__)
 PERIOD_S: Final = 1 / 30
 UNWATCHED_S: Final = 0.2
 """How soon a view is noticed that somebody has opened."""
+ROTOR_STEP_DEG: Final = 1.0
+_WIND_STEP_MPS: Final = 1.0
 _LOOK_AGAIN_S: Final = 0.25
 """What is old becomes stale without anything new on the bus."""
 
@@ -69,6 +71,7 @@ class SceneFeed:
         self._watched = False
         self._seen: tuple[int, int] | None = None
         self._looked_s = 0.0
+        self._rotor = RotorPose()
 
     def step(self, now_s: float) -> bool:
         """Show what changed; ``now_s`` is a monotonic time in s. True while anybody looks.
@@ -78,6 +81,7 @@ class SceneFeed:
         if not self._scene.watched:
             if self._watched:
                 self._scene.forget()
+                self._rotor = RotorPose()
             self._watched = False
             return False
         shown = self._bench.connection
@@ -97,4 +101,19 @@ class SceneFeed:
             poses |= {line.blade: pose(line) for line in axis_lines(shown.turbine, targets, now_ns)}
             rotor = rotor_line(shown.live, now_ns)
         self._scene.show(poses)
-        self._scene.show_rotor(rotor_pose(rotor))
+        self._show_rotor(rotor_pose(rotor))
+
+    def _show_rotor(self, pose: RotorPose) -> None:
+        """Every step of the rotor makes all viewers draw everything anew: those that nobody could see are left out.
+
+        Whatever is shown was received; nothing is made up between.
+        """
+        before = self._rotor
+        if pose.azimuth_deg is not None and before.azimuth_deg is not None:
+            turned = abs((pose.azimuth_deg - before.azimuth_deg + 180.0) % 360.0 - 180.0)
+            windy = abs((pose.wind_mps or 0.0) - (before.wind_mps or 0.0))
+            known = (pose.wind_mps is None) is (before.wind_mps is None)
+            if known and turned < ROTOR_STEP_DEG and windy < _WIND_STEP_MPS:
+                return
+        self._rotor = pose
+        self._scene.show_rotor(pose)

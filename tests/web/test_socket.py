@@ -18,7 +18,9 @@ from app.model.datatypes import DataType, encode_raw
 from app.service.journal import Kind
 from app.web.socket import HEARTBEAT_S
 from app.wire import sdo
-from tests.web.rig import DEADLINE_S, Page, Server, running, wait_until
+from app.wire.frame import Can, Direction, Frame
+from app.wire.twin_environment import CAN_ID, TwinEnvironment, pack_environment
+from tests.web.rig import BUS, DEADLINE_S, Page, Server, running, wait_until
 
 PMC_2 = "wtg-07/blade-2/pmc"
 PMM_2 = "wtg-07/blade-2/pmm"
@@ -121,7 +123,8 @@ async def test_axes(server: Server, page: Page) -> None:
     assert axes[1] | {"station": ""} == {
         "station": "", "blade": 1, "position_deg": None, "position_t_ns": None, "demand_deg": None,
         "velocity_dps": None, "state": None, "fault_code": None, "fault_text_key": None, "battery_soc_pct": None,
-        "battery_v": None, "dc_link_v": None, "stale": True,
+        "battery_v": None, "dc_link_v": None, "stale": True, "look": "unknown", "faults": [],
+        "current_pct": None, "following_error_deg": None,
     }  # fmt: skip
     axis = axes[2]
     assert (axis["position_deg"], axis["demand_deg"], axis["state"]) == (81.23, 82.0, "axis_state.operation_enabled")
@@ -286,3 +289,19 @@ async def test_a_page_that_leaves_is_forgotten(server: Server) -> None:
             await page.until("heartbeat")
             assert len(listeners) == others + 1
         await wait_until(lambda: len(listeners) == others)
+
+
+async def test_rotor_and_wind_are_told_where_a_twin_tells_them(server: Server, page: Page) -> None:
+    await page.subscribe("rotor")
+    unknown = await page.until("rotor")
+    assert unknown["data"] == {
+        "azimuth_deg": None, "rotor_rpm": None, "wind_mps": None, "wind_deg": None, "t_ns": None, "stale": False,
+    }  # fmt: skip
+    data = pack_environment(TwinEnvironment(12.5, 0.4, 7.5, -3.0))
+    frame = Frame(server.bench.stamper(), BUS, Direction.RX, Can(CAN_ID, data, extended=True))
+    server.connection.buses[BUS].on_frames([frame])
+    known = (await page.until("rotor"))["data"]
+    assert (known["azimuth_deg"], known["rotor_rpm"], known["wind_mps"], known["wind_deg"]) == (12.5, 0.4, 7.5, -3.0)
+    assert (known["t_ns"], known["stale"]) == (frame.t_ns, False)
+    stale = (await page.until("rotor", lambda line: line["stale"]))["data"]
+    assert stale["azimuth_deg"] == 12.5

@@ -9,6 +9,7 @@ import {
 import { useEffect, useRef, useState } from "react";
 import { useTexts } from "../texts/texts";
 import classes from "./SceneDock.module.css";
+import { Facts } from "./SceneDockFacts";
 import { Labels, type LabelPlacer } from "./SceneDockLabels";
 import { Legend } from "./SceneDockLooks";
 import { CAMERAS, type CameraName, tellScene, useSceneMessages, type View } from "./sceneDockBridge";
@@ -61,7 +62,7 @@ enum Link {
 
 function SceneView() {
   const t = useTexts();
-  const [search, update] = usePageSearch();
+  const [, update] = usePageSearch();
   const ready = useIdle();
   const frame = useRef<HTMLIFrameElement>(null);
   const labels = useRef<LabelPlacer>(null);
@@ -109,7 +110,8 @@ function SceneView() {
         <Cameras chosen={freed ? null : view.camera} onChoose={fly} />
         <GhostSwitch on={view.ghosts} onChange={(on) => update({ ghost: on ? undefined : "off" })} />
       </div>
-      <Legend key={search.lang} />
+      <Facts />
+      <Legend />
     </>
   );
 }

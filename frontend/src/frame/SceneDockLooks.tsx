@@ -4,6 +4,7 @@ import {
   IconBolt,
   IconCircle,
   IconClockPause,
+  IconGhost2,
   IconQuestionMark,
 } from "@tabler/icons-react";
 import type { AxisData } from "../api/types";
@@ -42,6 +43,12 @@ export function Legend() {
           {t(`page.look.${look}`)}
         </li>
       ))}
+      <li>
+        <span className={classes.sign} data-look="ghost" aria-hidden>
+          <IconGhost2 size={13} stroke={2.4} />
+        </span>
+        {t("page.look.ghost")}
+      </li>
     </ul>
   );
 }
