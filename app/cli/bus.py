@@ -11,8 +11,9 @@ from collections.abc import Callable, Coroutine, Mapping
 from typing import Any
 
 from app.cli.arguments import seconds
+from app.cli.audited import audited
 from app.cli.connecting import connected, find_nodes, make_connection, named_turbine, run_command, sheets_of
-from app.cli.output import Output, error_text
+from app.cli.output import Output
 from app.cli.targets import (
     add_connection,
     description_id,
@@ -24,6 +25,7 @@ from app.model.address import Address, parse_address
 from app.model.checks import Allow, check_read
 from app.model.datatypes import Raw
 from app.model.description import Entry
+from app.model.texts import error_text
 from app.model.values import show, to_scaled
 from app.service.backup import ReadReport, read_device, read_devices, readable, to_set, write_set
 from app.service.connection import Connection
@@ -184,21 +186,22 @@ async def _write(arguments: argparse.Namespace, output: Output) -> int:
     async with connected(arguments, output) as connection:
         target = _target(connection, arguments.target)
         entry = target.entry(address)
-        try:
-            result = await write_text(
-                connection.driver(target),
-                target,
-                address,
-                arguments.value,
-                connection.journal,
-                allow=_allowed(arguments),
-            )
-        except asyncio.CancelledError:
-            output.say("cli.write_interrupted", device=target.slug, address=address.short, name=entry.title)
-            raise
-        _tell_written(target, entry, result, output)
-        if arguments.save and result.verified:
-            await _save_one(connection, target, output)
+        async with audited(arguments, output, connection.journal):
+            try:
+                result = await write_text(
+                    connection.driver(target),
+                    target,
+                    address,
+                    arguments.value,
+                    connection.journal,
+                    allow=_allowed(arguments),
+                )
+            except asyncio.CancelledError:
+                output.say("cli.write_interrupted", device=target.slug, address=address.short, name=entry.title)
+                raise
+            _tell_written(target, entry, result, output)
+            if arguments.save and result.verified:
+                await _save_one(connection, target, output)
     return 0 if result.verified else UnverifiedError.exit_code
 
 
@@ -222,7 +225,9 @@ def _tell_written(target: Target, entry: Entry, result: WriteResult, output: Out
 
 async def _save(arguments: argparse.Namespace, output: Output) -> int:
     async with connected(arguments, output) as connection:
-        await _save_one(connection, _target(connection, arguments.target), output)
+        target = _target(connection, arguments.target)
+        async with audited(arguments, output, connection.journal):
+            await _save_one(connection, target, output)
     return 0
 
 
@@ -235,7 +240,8 @@ async def _save_one(connection: Connection, target: Target, output: Output) -> N
 async def _restart(arguments: argparse.Namespace, output: Output) -> int:
     async with connected(arguments, output) as connection:
         target = _target(connection, arguments.target)
-        took = await restart(connection.driver(target), target, connection.journal, connection.stamper)
+        async with audited(arguments, output, connection.journal):
+            took = await restart(connection.driver(target), target, connection.journal, connection.stamper)
         text = output.texts("cli.restart_done", device=target.slug, took_s=f"{took.took_s:.2f}")
         output.result({"device": target.slug, "took_s": took.took_s}, text)
     return 0

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import atexit
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -17,6 +20,10 @@ from typing import Any
 HUBSIDE = (sys.executable, "-m", "app.cli")
 ROOT = Path(__file__).resolve().parents[2]
 START_S = 30.0
+SCRATCH = tempfile.mkdtemp(prefix="hubside-tests-")
+"""The data folder of commands that name none: never that of the person who runs the tests."""
+USUAL = {"HUBSIDE_LANGUAGE": "en", "HUBSIDE_DATA": SCRATCH}
+atexit.register(shutil.rmtree, SCRATCH, ignore_errors=True)
 
 
 @dataclass
@@ -62,7 +69,7 @@ def running(*arguments: str, **environment: str) -> Iterator[Process]:
         stderr=subprocess.STDOUT,
         text=True,
         cwd=ROOT,
-        env={**os.environ, "HUBSIDE_LANGUAGE": "en", **environment},
+        env={**os.environ, **USUAL, **environment},
     )
     process = Process(popen)
     reader = threading.Thread(target=process.follow, daemon=True)
@@ -111,6 +118,6 @@ def hubside(*arguments: str, data: Path | None = None, timeout_s: float = 60.0) 
         text=True,
         cwd=ROOT,
         timeout=timeout_s,
-        env={**os.environ, "HUBSIDE_LANGUAGE": "en"},
+        env={**os.environ, **USUAL},
     )
     return Done(done.returncode, done.stdout, done.stderr)
