@@ -13,11 +13,10 @@ from app.errors import (
     HubsideError,
     NoAnswerError,
     RefusedError,
-    SdoAbortError,
     UnverifiedError,
     UsageError,
 )
-from app.model.texts import Texts
+from app.model.texts import Texts, error_text
 
 if TYPE_CHECKING:
     from app.model.eds import EdsWarning
@@ -93,15 +92,6 @@ def tell_warning(output: Output, path: Path, warning: EdsWarning) -> None:
     """One warning of an EDS or DCF file, with its line."""
     text = output.texts(warning.text_key, **warning.details)
     output.say("cli.eds_warning", file=path, line=warning.line, text=text)
-
-
-def error_text(texts: Texts, error: HubsideError) -> str:
-    """The operator's text of an error; an SDO abort code is given in words, the number behind."""
-    details = dict(error.details)
-    if isinstance(error, SdoAbortError):
-        words = texts(str(details.get("text_key_reason", "abort.unknown")))
-        details["reason"] = f"{words} (abort code {error.abort_code:08X}h)"
-    return texts(error.text_key, **details)
 
 
 def next_step(error: HubsideError) -> str | None:

@@ -8,6 +8,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
+from app.errors import HubsideError, SdoAbortError
+
 LANGUAGES: Final = ("en", "de")
 
 
@@ -36,6 +38,15 @@ class Texts:
 class _Dashes(dict[str, str]):
     def __missing__(self, key: str) -> str:
         return "–"
+
+
+def error_text(texts: Texts, error: HubsideError) -> str:
+    """The operator's text of an error; an SDO abort code is given in words, the number behind."""
+    details = dict(error.details)
+    if isinstance(error, SdoAbortError):
+        words = texts(str(details.get("text_key_reason", "abort.unknown")))
+        details["reason"] = f"{words} (abort code {error.abort_code:08X}h)"
+    return texts(error.text_key, **details)
 
 
 @cache

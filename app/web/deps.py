@@ -79,7 +79,7 @@ def get_target(request: Request, connection: ConnectionOf, turbine: str, station
 TargetOf = Annotated[Target, Depends(get_target)]
 
 
-class _Needs:
+class Needs:
     """Lets pass whose role covers ``role``, which a test may ask."""
 
     def __init__(self, role: Role) -> None:
@@ -93,4 +93,4 @@ class _Needs:
 
 def needs(role: Role) -> Any:
     """A route's dependency: only who has ``role`` or a higher one gets through."""
-    return Depends(_Needs(role))
+    return Depends(Needs(role))

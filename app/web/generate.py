@@ -11,10 +11,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
-from fastapi.openapi.utils import get_openapi
 from pydantic import TypeAdapter
 
 from app.web.app import create_api
+from app.web.documentation import document as documented
 from app.web.models import ClientMessage, ServerMessage
 
 SOCKET: Final[dict[str, Any]] = {"ServerMessage": ServerMessage, "ClientMessage": ClientMessage}
@@ -23,9 +23,8 @@ _REFERENCE: Final = "#/components/schemas/{model}"
 
 
 def openapi() -> dict[str, Any]:
-    """The OpenAPI document; its version is that of the API, so that a release does not change it."""
-    app = create_api(None)
-    document = get_openapi(title=app.title, version="1", routes=app.routes)
+    """The OpenAPI document."""
+    document = documented(create_api(None))
     schemas = document["components"]["schemas"]
     for name, model in SOCKET.items():
         mode: Any = "serialization" if name == "ServerMessage" else "validation"

@@ -31,6 +31,7 @@ from app.web.problem import (
     TooLargeError,
     UnauthorisedError,
     problem_of,
+    texts_for,
 )
 
 Scope = MutableMapping[str, Any]
@@ -315,7 +316,7 @@ async def _refuse(
     scope: Scope, headers: dict[str, str], send: Send, error: HubsideError, page_text: str | None = None
 ) -> None:
     """A problem document; a person who opens the page gets ``page_text`` in plain HTML."""
-    problem = problem_of(error)
+    problem = problem_of(error, texts=texts_for(headers.get("accept-language")))
     if page_text is not None and scope["type"] == "http" and "text/html" in headers.get("accept", ""):
         kind, body = "text/html; charset=utf-8", _page(page_text)
     else:

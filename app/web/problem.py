@@ -16,6 +16,7 @@ from starlette.exceptions import HTTPException
 
 from app import errors
 from app.errors import HubsideError
+from app.model.texts import LANGUAGES, Texts, error_text, load_texts
 from app.web.models import Problem
 
 log = logging.getLogger(__name__)
@@ -103,14 +104,20 @@ def status_of(error: HubsideError) -> HTTPStatus:
     return next((status for kind, status in _STATUS if isinstance(error, kind)), HTTPStatus.INTERNAL_SERVER_ERROR)
 
 
-def problem_of(error: HubsideError, status: HTTPStatus | None = None, device_state: str | None = None) -> Problem:
-    """The document of an error; ``device_state`` is a text key."""
+def problem_of(
+    error: HubsideError,
+    status: HTTPStatus | None = None,
+    device_state: str | None = None,
+    texts: Texts | None = None,
+) -> Problem:
+    """The document of an error; ``device_state`` is a text key. ``texts`` in English where None."""
     status = status or status_of(error)
     return Problem(
         type=f"urn:hubside:error:{error.code}",
         title=status.phrase,
         status=status.value,
         code=error.code,
+        text=error_text(texts or load_texts("en"), error),
         text_key=error.text_key,
         details={name: jsonable(detail) for name, detail in error.details.items()},
         device_state=device_state,
@@ -134,6 +141,26 @@ def jsonable(detail: Any) -> Any:
     return str(detail)
 
 
+def texts_for(accept_language: str | None, usual: str = "en") -> Texts:
+    """The texts of the language that an Accept-Language field wants most (RFC 9110, 12.5.4) and we speak."""
+    best, weight = usual, 0.0
+    for wish in (accept_language or "").split(","):
+        tag, _, parameter = wish.partition(";")
+        language = tag.strip().lower().partition("-")[0]
+        wanted = _weight(parameter)
+        if language in LANGUAGES and wanted > weight:
+            best, weight = language, wanted
+    return load_texts(best)
+
+
+def _weight(parameter: str) -> float:
+    name, _, number = parameter.strip().partition("=")
+    try:
+        return float(number) if name.strip() == "q" else 1.0
+    except ValueError:
+        return 0.0
+
+
 def response_of(problem: Problem) -> JSONResponse:
     """The answer that carries a problem."""
     return JSONResponse(problem.model_dump(), problem.status, media_type=MEDIA_TYPE)
@@ -142,23 +169,27 @@ def response_of(problem: Problem) -> JSONResponse:
 def install(app: FastAPI) -> None:
     """Have every error answered as a problem; defects of ours are logged with their traceback and named as such."""
 
+    def answer(request: Request, error: HubsideError, status: HTTPStatus | None = None) -> JSONResponse:
+        state = getattr(request.state, "device_state", None)
+        texts = texts_for(request.headers.get("accept-language"), app.state.language)
+        return response_of(problem_of(error, status, state() if callable(state) else None, texts))
+
     @app.exception_handler(HubsideError)
     async def refused(request: Request, error: HubsideError) -> JSONResponse:
-        state = getattr(request.state, "device_state", None)
-        return response_of(problem_of(error, device_state=state() if callable(state) else None))
+        return answer(request, error)
 
     @app.exception_handler(RequestValidationError)
-    async def invalid(_request: Request, error: RequestValidationError) -> JSONResponse:
+    async def invalid(request: Request, error: RequestValidationError) -> JSONResponse:
         reason = "; ".join(f"{'.'.join(str(part) for part in one['loc'])}: {one['msg']}" for one in error.errors())
-        return response_of(problem_of(InvalidRequestError(reason=reason)))
+        return answer(request, InvalidRequestError(reason=reason))
 
     @app.exception_handler(HTTPException)
     async def plain(request: Request, error: HTTPException) -> JSONResponse:
         status = HTTPStatus(error.status_code)
         own = NotFoundError(what=request.url.path) if status is HTTPStatus.NOT_FOUND else None
-        return response_of(problem_of(own or InvalidRequestError(reason=status.phrase), status))
+        return answer(request, own or InvalidRequestError(reason=status.phrase), status)
 
     @app.exception_handler(Exception)
     async def defect(request: Request, error: Exception) -> JSONResponse:
         log.error("%s %s failed", request.method, request.url.path, exc_info=error)
-        return response_of(problem_of(HubsideError(reason=type(error).__name__)))
+        return answer(request, HubsideError(reason=type(error).__name__))

@@ -18,12 +18,16 @@ API_VERSION: Literal[1] = 1
 
 
 class Problem(BaseModel):
-    """What went wrong (RFC 9457): ``text_key`` with ``details`` is the operator's text."""
+    """What went wrong (RFC 9457). ``text`` is the operator's text in the language that was asked for (Accept-Language).
+
+    It is made of ``text_key`` and ``details``; ``device_state`` is a text key.
+    """
 
     type: str
     title: str
     status: int
     code: str
+    text: str
     text_key: str
     details: dict[str, Any]
     device_state: str | None

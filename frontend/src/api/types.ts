@@ -13,7 +13,8 @@ export type Mode = Turbine["mode"];
 export type StationRef = Schemas["StationRef"];
 export type DeviceRef = Schemas["DeviceRef"];
 
-export type ProblemDoc = Schemas["Problem"];
+/** Its own text is left aside: the page makes it of key and details, in the language in which it is shown. */
+export type ProblemDoc = Omit<Schemas["Problem"], "text">;
 export type Job = Schemas["JobDoc"];
 export type JobRow = Schemas["JobRowDoc"];
 export type Failure = Schemas["Failure"];

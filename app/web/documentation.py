@@ -1,0 +1,149 @@
+"""What the OpenAPI document says beyond types: which problems a route may answer with, and examples of both.
+
+The problems follow from what a route depends on, so that no route can forget one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from http import HTTPStatus
+from typing import Any, Final
+
+from fastapi import FastAPI
+from fastapi.dependencies.models import Dependant
+from fastapi.openapi.utils import get_openapi
+from fastapi.routing import iter_route_contexts
+
+from app import errors
+from app.errors import HubsideError
+from app.web import deps
+from app.web.problem import (
+    MEDIA_TYPE,
+    ForbiddenHostError,
+    InvalidRequestError,
+    NotFoundError,
+    UnauthorisedError,
+    problem_of,
+)
+
+API_VERSION: Final = "1"
+"""Of the API itself: a release that does not change it does not change this."""
+
+_PROBLEM: Final = {"$ref": "#/components/schemas/Problem"}
+_SLUG: Final = "wtg-07/blade-2/pmc"
+_READY: Final = "nmt.state.pre_operational"
+
+ALWAYS: Final[tuple[HubsideError, ...]] = (
+    UnauthorisedError(),
+    ForbiddenHostError(host="evil.example", origin=None),
+)
+"""What any route answers a stranger, or a foreign page."""
+OF_A_ROLE: Final = errors.RoleError(needs="technician", has="viewer")
+OF_INPUT: Final = InvalidRequestError(reason="body.raw: Field required")
+OF_A_PATH: Final = NotFoundError(what=_SLUG)
+OF_A_CONNECTION: Final = errors.NotConnectedError()
+OF_A_DEVICE: Final[tuple[HubsideError, ...]] = (
+    errors.SdoAbortError(node=12, address="3110:01", abort_code=0x08000022, text_key_reason="abort.device_state"),
+    errors.BusLostError(bus="can0", reason="the adapter was pulled"),
+    errors.NoAnswerError(node=12, address="3110:01", timeout_s=1.0),
+)
+
+BODIES: Final[dict[str, Any]] = {
+    "Nothing": {},
+    "ConnectRequest": {"turbine": "wtg-07"},
+    "ReadRequest": {"addresses": ["6064", "3110:01"]},
+    "WriteRequest": {"address": "3110:01", "raw": 490},
+    "WritesRequest": {
+        "rows": [{"device": "wtg-07/blade-1/pmm", "address": "3110:01", "raw": 490, "expected_raw": 500}],
+        "save": ["wtg-07/blade-1/pmm"],
+        "on_failure": "stop",
+    },
+    "BackupRequest": {"reason": "before the exchange of the motor"},
+    "LoginRequest": {"name": "Anna", "password": "correct horse battery"},
+    "OwnPassword": {"old": "correct horse battery", "new": "blade and hub 12"},
+    "NewUser": {"name": "Ben", "password": "blade and hub 12", "role": "technician"},
+    "UserChange": {"role": "expert", "disabled": False, "password": None},
+    "VisitChange": {"reason": "yearly service", "work_order": "WO-20417"},
+    "VisitEnd": {"reason": "yearly service", "work_order": "WO-20417"},
+    "Favourites": {"addresses": ["6064", "3110:01"]},
+    "TestRequest": {"connection": "socketcan:can0", "bitrate": 500_000, "sure": False},
+    "SearchRequest": {"connection": "slcan:/dev/ttyACM0"},
+    "ScanRequest": {"connection": "socketcan:can0", "bitrate": 500_000, "consent": False},
+    "TurbineChange": {
+        "revision": "6f1c09",
+        "turbine": {
+            "slug": "wtg-08",
+            "name": "WTG-08",
+            "buses": [{"name": "can0", "connection": "socketcan:can0", "bitrate": 500_000}],
+            "stations": [],
+        },
+    },
+}
+"""An example of every body whose type has none of its own, by the name of the type."""
+
+
+def document(app: FastAPI) -> dict[str, Any]:
+    """The OpenAPI document of ``app``."""
+    made = get_openapi(title=app.title, version=API_VERSION, routes=app.routes)
+    for route in iter_route_contexts(app.routes):
+        dependant: Dependant | None = getattr(route, "dependant", None)
+        for method in getattr(route, "methods", None) or ():
+            operation = made["paths"].get(route.path, {}).get(method.lower())
+            if operation is not None and dependant is not None:
+                operation["responses"] = {
+                    **{code: answer for code, answer in operation["responses"].items() if code != "default"},
+                    **_problems(str(route.path), dependant),
+                    "default": _described("Anything else that went wrong", []),
+                }
+                _with_example(operation, made["components"]["schemas"])
+    return made
+
+
+def _problems(path: str, dependant: Dependant) -> dict[str, Any]:
+    by_status: dict[int, list[HubsideError]] = {}
+    for error in _errors(path, dependant):
+        by_status.setdefault(problem_of(error).status, []).append(error)
+    return {str(code): _described(HTTPStatus(code).phrase, found) for code, found in sorted(by_status.items())}
+
+
+def _errors(path: str, dependant: Dependant) -> Iterator[HubsideError]:
+    calls = list(_calls(dependant))
+    yield from ALWAYS
+    if any(isinstance(call, deps.Needs) for call in calls):
+        yield OF_A_ROLE
+    if dependant.body_params or dependant.query_params:
+        yield OF_INPUT
+    if "{" in path:
+        yield OF_A_PATH
+    if deps.get_connection in calls:
+        yield OF_A_CONNECTION
+    if deps.get_target in calls:
+        yield from OF_A_DEVICE
+
+
+def _calls(dependant: Dependant) -> Iterator[Callable[..., Any]]:
+    for inner in dependant.dependencies:
+        if inner.call is not None:
+            yield inner.call
+        yield from _calls(inner)
+
+
+def _described(text: str, found: list[HubsideError]) -> dict[str, Any]:
+    media: dict[str, Any] = {"schema": _PROBLEM}
+    if found:
+        media["examples"] = {
+            error.code: {"value": problem_of(error, device_state=_state_with(error)).model_dump()} for error in found
+        }
+    return {"description": text, "content": {MEDIA_TYPE: media}}
+
+
+def _state_with(error: HubsideError) -> str | None:
+    return _READY if error in OF_A_DEVICE else None
+
+
+def _with_example(operation: dict[str, Any], schemas: dict[str, Any]) -> None:
+    media = operation.get("requestBody", {}).get("content", {}).get("application/json")
+    if media is not None:
+        name = media["schema"]["$ref"].rpartition("/")[2]
+        own = schemas[name].get("examples")
+        media["example"] = own[0] if own else BODIES[name]
