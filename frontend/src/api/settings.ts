@@ -29,6 +29,7 @@ export type User = Schemas["UserDoc"];
 export type UserChange = Schemas["UserChange"];
 export type NewUser = Schemas["NewUser"];
 export type KnownTurbine = Schemas["KnownTurbine"];
+export type Visit = Schemas["VisitDoc"];
 export type AuditLine = Schemas["AuditLine"];
 export type AuditPage = Schemas["AuditPage"];
 export type AuditHead = Schemas["AuditHead"];
@@ -88,6 +89,12 @@ export const knownTurbinesQuery = queryOptions({
   staleTime: 0,
 });
 
+export const visitQuery = queryOptions({
+  queryKey: ["visit"],
+  queryFn: ({ signal }) => get<Schemas["PresentVisit"]>("/api/live/visit", signal),
+  staleTime: 0,
+});
+
 export const auditHeadQuery = queryOptions({
   queryKey: ["audit", "head"],
   queryFn: ({ signal }) => get<AuditHead>("/api/audit/head", signal),
@@ -137,6 +144,10 @@ export const settings = {
 export const connecting = {
   connect: (turbine: string) => send<object>("POST", "/api/live/connect", { turbine }),
   disconnect: () => send<object>("POST", "/api/live/disconnect", {}),
+  endVisit: (reason: string, work_order: string) =>
+    send<Visit>("POST", "/api/live/visit/end", { reason, work_order }),
+  changeVisit: (reason: string, work_order: string) =>
+    send<Visit>("PATCH", "/api/live/visit", { reason, work_order }),
 };
 
 export const signing = {

@@ -1,6 +1,14 @@
 import { Menu, UnstyledButton } from "@mantine/core";
-import { IconCheck, IconChevronDown, IconPlug, IconPlugOff, IconSettings } from "@tabler/icons-react";
+import {
+  IconCheck,
+  IconChevronDown,
+  IconDoorExit,
+  IconPlug,
+  IconPlugOff,
+  IconSettings,
+} from "@tabler/icons-react";
 import { useMutation, useQuery } from "@tanstack/react-query";
+import { lazy, Suspense, useState } from "react";
 import { queryClient, turbineQuery } from "../api/queries";
 import { connecting, knownTurbinesQuery } from "../api/settings";
 import { useTexts } from "../texts/texts";
@@ -10,30 +18,46 @@ import classes from "./Frame.module.css";
 import { useRole } from "./role";
 import { useOpenSettings } from "./search";
 
+const EndVisit = lazy(async () => ({ default: (await import("./ConnectVisit")).EndVisit }));
+
 /** The turbine that is connected, and the way to another one, or to none. */
 export function ConnectMenu() {
   const t = useTexts();
   const turbine = useQuery(turbineQuery).data;
   const { connect, disconnect, busy } = useConnecting();
+  const [ending, setEnding] = useState(false);
   const name = turbine?.name ?? t("page.connect.none");
   return (
-    <Menu position="bottom-start" width={340} keepMounted={false}>
-      <Menu.Target>
-        <UnstyledButton
-          className={classes.connect}
-          aria-label={t("page.connect.open", { turbine: name })}
-          data-testid="connect-menu"
-        >
-          <span className={classes.turbine} data-testid="turbine">
-            {busy ? t("page.connect.busy") : name}
-          </span>
-          <IconChevronDown size={18} aria-hidden />
-        </UnstyledButton>
-      </Menu.Target>
-      <Menu.Dropdown>
-        <Choices connect={connect} disconnect={disconnect} connected={turbine !== undefined} busy={busy} />
-      </Menu.Dropdown>
-    </Menu>
+    <>
+      {ending && (
+        <Suspense>
+          <EndVisit onClose={() => setEnding(false)} />
+        </Suspense>
+      )}
+      <Menu position="bottom-start" width={340} keepMounted={false}>
+        <Menu.Target>
+          <UnstyledButton
+            className={classes.connect}
+            aria-label={t("page.connect.open", { turbine: name })}
+            data-testid="connect-menu"
+          >
+            <span className={classes.turbine} data-testid="turbine">
+              {busy ? t("page.connect.busy") : name}
+            </span>
+            <IconChevronDown size={18} aria-hidden />
+          </UnstyledButton>
+        </Menu.Target>
+        <Menu.Dropdown>
+          <Choices
+            connect={connect}
+            disconnect={disconnect}
+            connected={turbine !== undefined}
+            busy={busy}
+            onEnd={() => setEnding(true)}
+          />
+        </Menu.Dropdown>
+      </Menu>
+    </>
   );
 }
 
@@ -42,9 +66,10 @@ interface ChoicesProps {
   disconnect: () => void;
   connected: boolean;
   busy: boolean;
+  onEnd: () => void;
 }
 
-function Choices({ connect, disconnect, connected, busy }: ChoicesProps) {
+function Choices({ connect, disconnect, connected, busy, onEnd }: ChoicesProps) {
   const t = useTexts();
   const { why } = useRole();
   const known = useQuery(knownTurbinesQuery);
@@ -80,6 +105,15 @@ function Choices({ connect, disconnect, connected, busy }: ChoicesProps) {
       <Menu.Item
         mih={40}
         disabled={locked || !connected}
+        leftSection={<IconDoorExit size={18} aria-hidden />}
+        onClick={onEnd}
+        data-testid="visit"
+      >
+        {t("page.visit.open")}
+      </Menu.Item>
+      <Menu.Item
+        mih={40}
+        disabled={locked || !connected}
         leftSection={<IconPlugOff size={18} aria-hidden />}
         onClick={disconnect}
         data-testid="disconnect"
@@ -97,7 +131,7 @@ function Choices({ connect, disconnect, connected, busy }: ChoicesProps) {
   );
 }
 
-function useConnecting(): Omit<ChoicesProps, "connected"> {
+function useConnecting(): Omit<ChoicesProps, "connected" | "onEnd"> {
   const t = useTexts();
   const failed = (title: string) => (error: unknown) => {
     const story = storyOf(error, t);

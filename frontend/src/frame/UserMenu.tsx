@@ -30,6 +30,7 @@ export function UserMenu() {
       <Menu.Target>
         <Tooltip label={t("page.user.is", { name: session.person, role })}>
           <Button
+            className={classes.userButton ?? ""}
             variant="default"
             px={10}
             leftSection={<IconUser size={18} aria-hidden />}

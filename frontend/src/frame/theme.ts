@@ -32,6 +32,9 @@ export const theme = createTheme({
     ActionIcon: { defaultProps: { size: TARGET_PX, variant: "default" } },
     CloseButton: { defaultProps: { size: TARGET_PX } },
     TextInput: { styles: { input: { minHeight: TARGET_PX } } },
+    PasswordInput: { styles: { input: { minHeight: TARGET_PX }, innerInput: { minHeight: TARGET_PX - 2 } } },
+    NumberInput: { styles: { input: { minHeight: TARGET_PX } } },
+    Autocomplete: { styles: { input: { minHeight: TARGET_PX } } },
     Select: { styles: { input: { minHeight: TARGET_PX } } },
     Modal: {
       defaultProps: { centered: true, overlayProps: { backgroundOpacity: 0.55 } },

@@ -56,7 +56,9 @@ export function AdaptersSection() {
             <thead>
               <tr>
                 {["adapter", "silent", "used", "action"].map((head) => (
-                  <th key={head}>{t(`page.settings.adapters.head.${head}`)}</th>
+                  <th key={head} data-head={head}>
+                    {t(`page.settings.adapters.head.${head}`)}
+                  </th>
                 ))}
               </tr>
             </thead>
@@ -210,11 +212,12 @@ function Check({ adapter }: { adapter: Adapter }) {
   const { job, running } = work;
   return (
     <div className={classes.turbine}>
-      <div className={classes.row} data-end>
+      <div className={classes.row} style={{ alignItems: "flex-start" }}>
         <BitrateSelect adapter={adapter} value={bitrate} onChange={setBitrate} />
         <NeedsRole role="technician">
           {(locked) => (
             <Button
+              mt={25}
               leftSection={<IconEar size={18} aria-hidden />}
               disabled={locked || running || (risky && !sure)}
               onClick={() => work.start(() => settings.test(adapter.connection, bitrate, sure))}
@@ -227,6 +230,7 @@ function Check({ adapter }: { adapter: Adapter }) {
         <NeedsRole role="technician">
           {(locked) => (
             <Button
+              mt={25}
               variant="default"
               leftSection={<IconWaveSine size={18} aria-hidden />}
               disabled={locked || running}
@@ -238,7 +242,7 @@ function Check({ adapter }: { adapter: Adapter }) {
           )}
         </NeedsRole>
         {running && (
-          <Button variant="subtle" onClick={work.cancel}>
+          <Button mt={25} variant="subtle" onClick={work.cancel}>
             {t("page.cancel")}
           </Button>
         )}
@@ -276,6 +280,7 @@ function BitrateSelect({ adapter, value, onChange }: SelectProps) {
     <Select
       w={150}
       label={t("page.settings.adapters.bitrate")}
+      inputWrapperOrder={["label", "input", "description", "error"]}
       description={adapter.sets_bitrate ? undefined : t("page.settings.adapters.bitrate_set")}
       data={rates.map((rate) => ({ value: String(rate), label: kbit(rate, t) }))}
       value={String(value)}

@@ -137,7 +137,7 @@ function BusRow({ bus, fixed, scanning, onChange, onRemove, onScan }: RowProps) 
         variant={scanning ? "filled" : "default"}
         aria-expanded={scanning}
         leftSection={<IconRadar2 size={18} aria-hidden />}
-        disabled={connectionFlaw !== undefined}
+        disabled={bus.connection === "" || connectionFlaw !== undefined}
         onClick={onScan}
         data-testid={`scan-${bus.name}`}
       >

@@ -54,7 +54,7 @@ export function PollTable({ device, onChange }: Props) {
           <thead>
             <tr>
               {["address", "name", "rate", "action"].map((head) => (
-                <th key={head} style={{ position: "sticky", top: 0, zIndex: 1 }}>
+                <th key={head} data-head={head} style={{ position: "sticky", top: 0, zIndex: 1 }}>
                   {t(`page.settings.polling.head.${head}`)}
                 </th>
               ))}

@@ -96,7 +96,7 @@ function Numbers({ draft, wrong, onChange }: NumbersProps) {
         return (
           <NumberInput
             key={field}
-            w={158}
+            w={196}
             label={t(`page.settings.polling.${field}`)}
             description={describe(field)}
             inputWrapperOrder={["label", "input", "description", "error"]}

@@ -32,7 +32,9 @@ export function TurbineEditor({ site, before, isNew, onSaved, onClose }: Props) 
   const others = site.turbines.filter((one) => isNew || one.slug !== before.slug).map((one) => one.slug);
   const flaws = flawsOf(draft, others);
   const touched = !sameTurbine(draft, before);
-  const shown: FlawTexts = new Map(flaws.map((one) => [one.at, t(one.key, one.details)]));
+  // An untouched form is not wrong yet, only empty.
+  const told = touched ? flaws : [];
+  const shown: FlawTexts = new Map(told.map((one) => [one.at, t(one.key, one.details)]));
   const complaint = saving.error instanceof Problem ? complaintOf(saving.error, draft.slug) : null;
   if (complaint) shown.set(complaint.at, complaint.text);
   const stations = (change: readonly SiteStation[]) => setDraft({ ...draft, stations: [...change] });

@@ -97,7 +97,9 @@ function Users() {
           <thead>
             <tr>
               {["name", "role", "state", "action"].map((head) => (
-                <th key={head}>{t(`page.settings.users.head.${head}`)}</th>
+                <th key={head} data-head={head}>
+                  {t(`page.settings.users.head.${head}`)}
+                </th>
               ))}
             </tr>
           </thead>
