@@ -5,16 +5,14 @@ from __future__ import annotations
 import asyncio
 import json
 from collections.abc import AsyncIterator, Iterator
-from typing import Any
 
 import httpx
-import msgspec
 import numpy as np
 import pytest
 import websockets
-import zstandard
 
 from app.scene.hub import BladePose, BladeState, HubScene
+from tests.scene.viewer import messages_of
 from tests.web.rig import DEADLINE_S, Server, denied, running
 
 PROTOCOL = websockets.Subprotocol("viser-v1.1.1")
@@ -112,14 +110,6 @@ async def test_a_pose_reaches_the_view(server: Server, scene: HubScene) -> None:
                     colour = tuple(message["updates"]["color"])
         assert turn == pytest.approx((0.5**0.5, 0.0, 0.0, -(0.5**0.5)))
         assert colour == BladeState.ENABLED.rgb
-
-
-def messages_of(data: bytes) -> list[dict[str, Any]]:
-    """The messages of one window of the 3D server: lengths, then msgpack in zstd."""
-    whole, packed = (int.from_bytes(data[at : at + 8], "little") for at in (0, 8))
-    inner = zstandard.decompress(data[16 : 16 + packed], max_output_size=whole)
-    messages: list[dict[str, Any]] = msgspec.msgpack.decode(inner)["messages"]
-    return messages
 
 
 async def test_without_a_3d_view_its_paths_are_not_found() -> None:
