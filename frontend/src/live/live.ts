@@ -33,6 +33,7 @@ export const useBench = () => useTopic("bench", () => store.bench);
 export const useLink = () => useTopic("link", () => store.link);
 export const useNodes = () => useTopic("nodes", () => store.nodes);
 export const useAxes = () => useTopic("axes", () => store.axes);
+export const useRotor = () => useTopic("rotor", () => store.rotor);
 export const useEvents = () => useTopic("events", () => store.events);
 export const useLoadHistory = () => useTopic("link", () => store.loadHistory);
 
