@@ -2,6 +2,7 @@ import { useQuery } from "@tanstack/react-query";
 import { turbineQuery } from "../../api/queries";
 import { Attention } from "./Attention";
 import { BladeCard } from "./BladeCard";
+import { SinceLastVisit } from "./SinceLastVisit";
 import classes from "./Overview.module.css";
 
 /** Three blades at one look, and above them what needs a look. */
@@ -10,7 +11,10 @@ export function OverviewPage() {
   const blades = (turbine?.stations ?? []).filter((station) => station.blade !== null);
   return (
     <div className={classes.page}>
-      <Attention />
+      <div className={classes.news}>
+        <Attention />
+        <SinceLastVisit />
+      </div>
       <div className={classes.cards}>
         {blades.map((station) => (
           <BladeCard key={station.slug} station={station} />
