@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from functools import lru_cache
+from typing import Final, Literal
 
 from app.errors import UsageError
 from app.model.address import Address
@@ -12,9 +13,11 @@ from app.model.texts import LANGUAGES, load_texts
 from app.service.devices import Target
 from app.service.trace_text import Namer, TraceNote, details_text, notes_of
 from app.wire.frame import Direction
-from app.wire.trace import TraceRow
+from app.wire.trace import Tone, TraceRow
 from app.wire.trace_filter import MeansText, TraceFilter, addresses_of, parse_data, parse_ids
 from app.wire.trace_service import Service
+
+_PLAIN: Final = (Service.SDO_REQUEST, Service.SDO_RESPONSE, Service.TPDO, Service.RPDO)
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,22 +76,29 @@ def _means(q: str, targets: list[Target], namer: Namer) -> MeansText | None:
         for address in addresses_of(row):
             if address in objects or wanted in address.short.casefold():
                 return True
-        return any(wanted in words for note in notes_of(row, namer) for words in _words(note))
+        notes = () if _says_nothing(row) else notes_of(row, namer)
+        return any(wanted in words for note in notes for words in _words(note))
 
     return means
 
 
+def _says_nothing(row: TraceRow) -> bool:
+    """True for the bulk of the traffic, SDO and PDO that went well: its notes are figures at most."""
+    return row.tone is Tone.PLAIN and row.speaker.service in _PLAIN
+
+
+@lru_cache(maxsize=8192)
+def _folded(english: str) -> str:
+    """A name in all languages, folded."""
+    return "\n".join((english, *(load_texts(language).name(english) for language in LANGUAGES))).casefold()
+
+
 def objects_named(description: Description, wanted: str) -> frozenset[Address]:
     """Objects whose name holds ``wanted`` (folded), in any language."""
-    texts = [load_texts(language) for language in LANGUAGES]
-
-    def names(english: str) -> list[str]:
-        return [english.casefold(), *(text.name(english).casefold() for text in texts)]
-
     return frozenset(
         entry.address
         for entry in description
-        if any(wanted in name for own in (entry.title, entry.name, entry.object_name) for name in names(own))
+        if any(wanted in _folded(name) for name in (entry.title, entry.name, entry.object_name))
     )
 
 
