@@ -11,7 +11,7 @@ import importlib
 import logging
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
@@ -63,6 +63,10 @@ class Place:
     adapters: tuple[Adapter, ...]
 
 
+Look = Callable[[], list[Adapter]]
+"""Lists the adapters of one place; may take its time."""
+
+
 class _NoDriverError(Exception):
     """The vendor's library is not installed."""
 
@@ -74,16 +78,17 @@ def adapter(connection: str, title: str = "") -> Adapter:
     return Adapter(plain, config.interface, title, config.has_silent_mode, config.sets_bitrate)
 
 
-async def detect(timeout_s: float = TIMEOUT_S) -> list[Place]:
-    """All places, one after the other as they are named here. Never raises for what a place does."""
-    return list(await asyncio.gather(*(_look(interface, look, timeout_s) for interface, look in _PLACES.items())))
+async def detect(timeout_s: float = TIMEOUT_S, places: Mapping[CanInterface, Look] | None = None) -> list[Place]:
+    """All places, in the order in which they are named here. Never raises for what a place does."""
+    looks = _PLACES if places is None else places
+    return list(await asyncio.gather(*(_look(interface, look, timeout_s) for interface, look in looks.items())))
 
 
 _hanging: set[CanInterface] = set()
 """Places whose thread has not come back: another one would hang as well."""
 
 
-async def _look(interface: CanInterface, look: Callable[[], list[Adapter]], timeout_s: float) -> Place:
+async def _look(interface: CanInterface, look: Look, timeout_s: float) -> Place:
     if interface in _hanging:
         return Place(interface, Health.TIMED_OUT, f"has been busy for more than {timeout_s:g} s", ())
     loop = asyncio.get_running_loop()
@@ -109,7 +114,7 @@ async def _look(interface: CanInterface, look: Callable[[], list[Adapter]], time
         return Place(interface, Health.TIMED_OUT, f"did not answer within {timeout_s:g} s", ())
 
 
-def _place(interface: CanInterface, look: Callable[[], list[Adapter]]) -> Place:
+def _place(interface: CanInterface, look: Look) -> Place:
     try:
         return Place(interface, Health.OK, "", tuple(look()))
     except _NoDriverError as error:
@@ -183,7 +188,7 @@ def _reported(interface: str) -> list[dict[str, Any]]:
     return [dict(one) for one in can.detect_available_configs([interface], timeout=TIMEOUT_S)]
 
 
-_PLACES: Final[dict[CanInterface, Callable[[], list[Adapter]]]] = {
+_PLACES: Final[Mapping[CanInterface, Look]] = {
     CanInterface.SLCAN: _serial,
     CanInterface.SOCKETCAN: _socketcan,
     CanInterface.PCAN: _pcan,
