@@ -136,15 +136,20 @@ def test_a_limit_is_changed_written_saved_and_proven_by_a_restart(page: Page, de
     expect(field).to_have_value("50.0", timeout=WAIT_MS)
 
     field.fill("9999999")
-    expect(page.get_by_test_id("write")).to_be_disabled()
+    expect(page.get_by_test_id("stage")).to_be_disabled()
     expect(page.get_by_text("3276.7").first).to_be_visible()
 
     field.fill("49.0")
     expect(page.get_by_test_id("preview")).to_contain_text("49.0")
-    page.get_by_test_id("write").click()
+    page.get_by_test_id("stage").click()
+    expect(value).to_contain_text("50.0 → 49.0")
+    page.get_by_test_id("review").click()
+    page.get_by_test_id("save-after-wtg-07/blade-1/pmm").uncheck()
+    hold(page, "write-hold")
     expect(page.get_by_test_id("write-verified")).to_be_visible()
-    page.keyboard.press("Escape")
+    page.get_by_test_id("review-close").click()
     expect(value).to_contain_text("49.0")
+    expect(value).not_to_contain_text("→")
     expect(stored).not_to_contain_text("49.0")
 
     page.get_by_test_id("save").click()

@@ -1,4 +1,4 @@
-import { useCallback, useDeferredValue, useEffect, useMemo, useRef, useState } from "react";
+import { useCallback, useEffect, useMemo, useRef, useState } from "react";
 import { usePageSearch } from "../../frame/search";
 import { filterRows, rowsOf } from "../../model/rows";
 import { useTexts } from "../../texts/texts";
@@ -7,7 +7,7 @@ import { DeviceContextOfTable, useBenchOfTable, useDevice } from "./context";
 import { DetailPanel } from "./DetailPanel";
 import { useChanges } from "./history";
 import { Legend } from "./Legend";
-import { filterOnly, readOnly, tallyOf, writeOnly } from "./only";
+import { filterOnly, type Only, readOnly, tallyOf, writeOnly } from "./only";
 import classes from "./Parameters.module.css";
 import { ParameterTable, type TableHandle } from "./ParameterTable";
 import { StateLine } from "./StateLine";
@@ -38,6 +38,13 @@ export function Dictionary() {
   );
   const onSort = useCallback((sort: string | undefined) => update({ sort }), [update]);
   const opened = useMemo(() => all.find((row) => row.entry.address === search.edit), [all, search.edit]);
+  const onOnly = useCallback((next: ReadonlySet<Only>) => update({ only: writeOnly(next) }), [update]);
+  const onHide = useCallback(
+    (ids: string[]) => update({ hide: ids.length === 0 ? "none" : ids.join() }),
+    [update],
+  );
+  const onEnter = useCallback(() => handle.current?.focus(), []);
+  const onJump = useCallback((group: string) => handle.current?.jumpTo(group), []);
   const close = () => {
     update({ edit: undefined });
     handle.current?.focus();
@@ -47,14 +54,14 @@ export function Dictionary() {
       <Toolbar
         filter={typed}
         onFilter={setTyped}
-        onEnter={() => handle.current?.focus()}
+        onEnter={onEnter}
         only={table.only}
-        onOnly={(only) => update({ only: writeOnly(only) })}
+        onOnly={onOnly}
         hidden={table.hidden}
-        onHide={(ids) => update({ hide: ids.length === 0 ? "none" : ids.join() })}
+        onHide={onHide}
         visible={visible}
         tally={table.tally}
-        onJump={(group) => handle.current?.jumpTo(group)}
+        onJump={onJump}
       />
       {bench.devices.map((device) => (
         <DeviceContextOfTable key={device.slug} value={device}>
@@ -101,8 +108,7 @@ function useRowsShown(typed: string) {
   const version = useCoarseVersion(slugs);
   const changes = useChanges(slugs);
   const all = useMemo(() => rowsOf(doc, t), [doc, t]);
-  const deferred = useDeferredValue(typed);
-  const found = useMemo(() => filterRows(all, deferred), [all, deferred]);
+  const found = useMemo(() => filterRows(all, typed), [all, typed]);
   const only = useMemo(() => readOnly(search.only), [search.only]);
   const relevant = only.size === 0 ? 0 : version;
   const left = useMemo(

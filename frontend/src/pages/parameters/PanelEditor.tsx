@@ -55,7 +55,6 @@ export function PanelEditor({ entry }: { entry: EntryDoc }) {
       }}
     >
       <Stack gap="sm">
-        <Places entry={entry} onTake={take} />
         <ValueEditor entry={entry} draft={draft} />
         <Preview entry={entry} from={rawOf(cell)} to={draft.raw} />
         <Speaks entry={entry} draft={draft} />
@@ -82,6 +81,7 @@ export function PanelEditor({ entry }: { entry: EntryDoc }) {
             </Button>
           )}
         </Group>
+        <Places entry={entry} onTake={take} />
       </Stack>
     </form>
   );

@@ -13,7 +13,9 @@ import classes from "./Parameters.module.css";
 import { useTableKeys } from "./tableKeys";
 
 const ROW_PX = 40;
-const OVERSCAN = 6;
+const OVERSCAN = 4;
+/** Rows in the document are used again for other lines: more than are ever seen at a time. */
+const SLOTS = 64;
 const AGE_MS = 1000;
 
 /** What others may ask of the table. */
@@ -60,6 +62,7 @@ export const ParameterTable = memo(function ParameterTable(props: Props) {
     estimateSize: () => ROW_PX,
     overscan: OVERSCAN,
     scrollPaddingStart: ROW_PX,
+    useFlushSync: false,
   });
   const done = () => {
     setEditing(null);
@@ -103,7 +106,7 @@ export const ParameterTable = memo(function ParameterTable(props: Props) {
           if (line.kind === "group")
             return (
               <GroupRow
-                key={keyOf(line)}
+                key={item.index % SLOTS}
                 line={line}
                 tally={props.tally.get(line.id)}
                 onToggle={onToggleGroup}
@@ -113,7 +116,7 @@ export const ParameterTable = memo(function ParameterTable(props: Props) {
           const { address } = line.row.entry;
           return (
             <EntryRow
-              key={keyOf(line)}
+              key={item.index % SLOTS}
               row={line.row}
               columns={columns}
               tracks={tracks}

@@ -6,6 +6,7 @@ import { store, useDeviceVersion, useNodes, useServerNow } from "../../live/live
 import { useTexts } from "../../texts/texts";
 import { age } from "../../ui/format";
 import { heartbeatOf } from "../overview/nodes";
+import { rawOf } from "./cellValue";
 import { useDevice } from "./context";
 import classes from "./Parameters.module.css";
 import { type ReadAll, useReadAll, useReadAtFirstSight } from "./readAll";
@@ -131,5 +132,14 @@ function missingOf(entries: readonly EntryDoc[], slug: string, refused: Readonly
   return entries
     .filter((entry) => entry.readable && store.cell(slug, entry.address)?.known !== true)
     .map((entry) => entry.address)
-    .filter((address) => !refused.has(address));
+    .filter((address) => !refused.has(address) && !isEmptyError(address, slug));
+}
+
+const ERROR_FIELD = /^1003:([0-9A-F]{2})$/i;
+
+/** An error history that is shorter than its object has nothing to read (CiA 301, 7.5.2.4): its sub 0 counts it. */
+function isEmptyError(address: string, slug: string): boolean {
+  const sub = ERROR_FIELD.exec(address)?.[1];
+  const count = rawOf(store.cell(slug, "1003"));
+  return sub !== undefined && typeof count === "number" && Number.parseInt(sub, 16) > count;
 }

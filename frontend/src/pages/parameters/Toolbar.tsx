@@ -1,4 +1,4 @@
-import { ActionIcon, Button, CloseButton, Indicator, Menu, TextInput, Tooltip } from "@mantine/core";
+import { ActionIcon, Button, CloseButton, Menu, TextInput, Tooltip } from "@mantine/core";
 import {
   IconAdjustmentsHorizontal,
   IconFilter,
@@ -6,7 +6,7 @@ import {
   IconSquare,
   IconSquareCheck,
 } from "@tabler/icons-react";
-import { useEffect, useRef } from "react";
+import { memo, startTransition, useEffect, useRef, useState } from "react";
 import type { GroupTally } from "../../model/rows";
 import { useTexts } from "../../texts/texts";
 import { useBenchOfTable } from "./context";
@@ -30,23 +30,29 @@ interface Props {
   onJump: (group: string) => void;
 }
 
-export function Toolbar(props: Props) {
+export const Toolbar = memo(function Toolbar(props: Props) {
   const t = useTexts();
   return (
     <div className={classes.toolbar} role="toolbar" aria-label={t("page.table.tools")}>
       <FilterInput filter={props.filter} onFilter={props.onFilter} onEnter={props.onEnter} />
-      <OnlyMenu only={props.only} onOnly={props.onOnly} />
       <GroupMenu tally={props.tally} onJump={props.onJump} />
       <TableMenu hidden={props.hidden} onHide={props.onHide} visible={props.visible} />
+      <OnlyMenu only={props.only} onOnly={props.onOnly} />
       <span className={classes.spacer} />
       <DeviceActions />
     </div>
   );
-}
+});
 
+/** Only the field itself is drawn with a key; the table follows as a transition, which the next key interrupts. */
 function FilterInput({ filter, onFilter, onEnter }: Pick<Props, "filter" | "onFilter" | "onEnter">) {
   const t = useTexts();
   const input = useRef<HTMLInputElement>(null);
+  const [typed, setTyped] = useState(filter);
+  const change = (text: string) => {
+    setTyped(text);
+    startTransition(() => onFilter(text));
+  };
   useEffect(() => {
     // "/" goes to the filter, as long as nothing is being typed elsewhere.
     const focus = (event: KeyboardEvent) => {
@@ -68,12 +74,10 @@ function FilterInput({ filter, onFilter, onEnter }: Pick<Props, "filter" | "onFi
       leftSection={<IconFilter size={17} aria-hidden />}
       rightSectionWidth={40}
       rightSection={
-        filter !== "" && (
-          <CloseButton aria-label={t("page.table.clear_filter")} onClick={() => onFilter("")} />
-        )
+        typed !== "" && <CloseButton aria-label={t("page.table.clear_filter")} onClick={() => change("")} />
       }
-      value={filter}
-      onChange={(event) => onFilter(event.currentTarget.value)}
+      value={typed}
+      onChange={(event) => change(event.currentTarget.value)}
       onKeyDown={(event) => {
         if (event.key !== "ArrowDown" && event.key !== "Enter") return;
         event.preventDefault();
@@ -84,7 +88,9 @@ function FilterInput({ filter, onFilter, onEnter }: Pick<Props, "filter" | "onFi
   );
 }
 
-/** Which parameters: a button that says how many filters are set, as a hidden filter must never hide rows unseen. */
+/** Two filters are at hand where there is room; a filter that is set is always seen, as it hides rows. */
+const AT_HAND: readonly Only[] = [Only.Different, Only.Changed];
+
 function OnlyMenu({ only, onOnly }: Pick<Props, "only" | "onOnly">) {
   const t = useTexts();
   const { siblings } = useBenchOfTable();
@@ -96,29 +102,12 @@ function OnlyMenu({ only, onOnly }: Pick<Props, "only" | "onOnly">) {
   };
   return (
     <>
-      {choices
-        .filter((one) => only.has(one))
-        .map((one) => (
-          <Button
-            key={one}
-            variant="light"
-            px="sm"
-            rightSection={<span aria-hidden>✕</span>}
-            aria-label={t("page.only.remove", { name: t(`page.only.${one}`) })}
-            onClick={() => toggle(one)}
-            data-testid={`without-${one}`}
-          >
-            {t(`page.only.${one}`)}
-          </Button>
-        ))}
       <Menu position="bottom-start" closeOnItemClick={false}>
         <Menu.Target>
           <Tooltip label={t("page.only.menu")}>
-            <Indicator disabled={only.size === 0} label={only.size} size={16} offset={4}>
-              <ActionIcon aria-label={t("page.only.menu")} data-testid="only-menu">
-                <IconAdjustmentsHorizontal size={18} aria-hidden />
-              </ActionIcon>
-            </Indicator>
+            <ActionIcon aria-label={t("page.only.menu")} data-testid="only-menu">
+              <IconAdjustmentsHorizontal size={18} aria-hidden />
+            </ActionIcon>
           </Tooltip>
         </Menu.Target>
         <Menu.Dropdown>
@@ -141,6 +130,22 @@ function OnlyMenu({ only, onOnly }: Pick<Props, "only" | "onOnly">) {
           })}
         </Menu.Dropdown>
       </Menu>
+      {choices
+        .filter((one) => only.has(one) || AT_HAND.includes(one))
+        .map((one) => (
+          <Button
+            key={one}
+            className={only.has(one) ? undefined : classes.atHand}
+            variant={only.has(one) ? "light" : "default"}
+            px="sm"
+            rightSection={only.has(one) ? <span aria-hidden>✕</span> : undefined}
+            aria-pressed={only.has(one)}
+            onClick={() => toggle(one)}
+            data-testid={`toggle-${one}`}
+          >
+            {t(`page.only.${one}`)}
+          </Button>
+        ))}
     </>
   );
 }

@@ -34,7 +34,8 @@ export function ValueCell(props: ValueCellProps) {
   const { entry, title } = row;
   const cell = useCell(device.slug, entry.address);
   const change = useChange(device.slug, entry.address);
-  if (props.editing) return <InlineEditor entry={entry} device={device} onDone={props.onEdited} />;
+  if (props.editing)
+    return <InlineEditor key={entry.address} entry={entry} device={device} onDone={props.onEdited} />;
   const { t } = device;
   const open = lockOf(entry, role) === null;
   const name = side ? `${title}, ${nameOf(device.slug)}` : title;
