@@ -8,9 +8,7 @@ from contextlib import asynccontextmanager
 
 from app.cli.output import Output
 from app.errors import StoreInUseError
-from app.service.audit import AuditLog
 from app.service.journal import Journal
-from app.store.store import Store
 
 
 @asynccontextmanager
@@ -20,6 +18,10 @@ async def audited(arguments: argparse.Namespace, output: Output, journal: Journa
     While a server has the store this is said instead: the server sees writes on the bus, and audits them as those of
     another master.
     """
+    # Late: most commands on a bus change nothing, and need not wait for the store's libraries.
+    from app.service.audit import AuditLog
+    from app.store.store import Store
+
     try:
         store = Store.open(arguments.settings.data)
     except StoreInUseError:

@@ -10,7 +10,7 @@ import sys
 from collections.abc import AsyncIterator, Coroutine
 from contextlib import asynccontextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from app.cli.output import Output, tell_warning
 from app.cli.runtime import spare_collector
@@ -19,12 +19,13 @@ from app.drivers.contract import FoundNode
 from app.errors import NoAnswerError, UsageError
 from app.model.address import is_decimal
 from app.model.site import Turbine, load_site
-from app.service.bench import Bench
 from app.service.bitrates import with_bitrate, with_bitrates
 from app.service.connection import Connection
 from app.service.options import Options
 from app.service.sites import Sites
-from app.store.store import Store
+
+if TYPE_CHECKING:
+    from app.service.bench import Bench
 
 TERMINATED = 143
 """Exit code after SIGTERM, as shells have it."""
@@ -68,6 +69,10 @@ async def make_bench(arguments: argparse.Namespace, output: Output, record: bool
     Without ``--site`` and ``--can`` it knows those of the data folder's site file, and connects to one where only one
     is named; what is connected, and to what, is chosen in the page then.
     """
+    # Late: the other commands on a bus need neither bench nor store, and these take some time to load.
+    from app.service.bench import Bench
+    from app.store.store import Store
+
     store = Store.open(arguments.settings.data)  # first: nothing is sent where another process is at work already
     sheets = sheets_of(arguments, output)
     home: Path = arguments.settings.data / "site.toml"

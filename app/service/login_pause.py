@@ -47,11 +47,17 @@ class LoginPause:
             failures.count = 0
         failures.count += 1
         failures.last_s = now_s
-        if failures.count > FREE:
-            failures.until_s = now_s + min(LONGEST_S, FIRST_S * 2.0 ** (failures.count - FREE - 1))
+        self.begin(name_key, address)
         self._failures.move_to_end((name_key, address))
         while len(self._failures) > KEPT:
             self._failures.popitem(last=False)
+
+    def begin(self, name_key: str, address: str) -> None:
+        """Have the pause that is due run from now on: trying took its time."""
+        failures = self._failures.get((name_key, address))
+        if failures is not None and failures.count > FREE:
+            exponent = min(failures.count - FREE - 1, 30)
+            failures.until_s = self._monotonic_s() + min(LONGEST_S, FIRST_S * 2.0**exponent)
 
     def succeeded(self, name_key: str, address: str) -> None:
         """Forget what failed."""

@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import asyncio
 import hmac
+import logging
 import secrets
 import time
 from collections.abc import Callable
+from concurrent.futures import Future
 from dataclasses import dataclass, field
 from hashlib import sha256
 from typing import Final
@@ -24,6 +26,8 @@ from app.store import user_rows
 from app.store.store import Store
 from app.store.user_rows import SessionRow, name_key
 from app.store.uuid7 import Uuid7
+
+log = logging.getLogger(__name__)
 
 SECRET_BYTES: Final = 32
 SESSION_S: Final = 12 * 3600
@@ -99,6 +103,7 @@ class Sessions:
         try:
             user = await self._users.identify(name, password)
         except LoginError:
+            self._pause.begin(key, address)
             self._audit.note(Action.LOGIN_FAILED, name.strip()[:64], None, at=address)
             raise
         self._pause.succeeded(key, address)
@@ -152,7 +157,8 @@ class Sessions:
     def _shut_out(self, user_id: str | None) -> None:
         ids = self._end([one for one in self._open.values() if one.row.user_id == user_id])
         if ids:
-            self._store.submit(lambda connection: user_rows.drop_sessions(connection, ids))
+            dropping = self._store.submit(lambda connection: user_rows.drop_sessions(connection, ids))
+            dropping.add_done_callback(_log_failure)
 
     def _end(self, sessions: list[Session]) -> list[str]:
         """End sessions at once, in memory."""
@@ -164,6 +170,13 @@ class Sessions:
     async def _forget(self, ids: list[str]) -> None:
         if ids:
             await self._store.run(lambda connection: user_rows.drop_sessions(connection, ids))
+
+
+def _log_failure(done: Future[None]) -> None:
+    """They are ended here all the same; after a restart they must not be open again without a word."""
+    error = done.exception()
+    if error is not None:
+        log.error("ended sessions could not be forgotten on the disk: %s", error)
 
 
 def _hash(secret: str) -> str:
