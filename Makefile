@@ -64,7 +64,7 @@ wheel: $(VENV)/.ready frontend/dist/index.html
 	$(PY) -m build --wheel --no-isolation --outdir dist .
 
 screenshots: setup
-	$(PY) -m docs.make_screenshots
+	$(PY) -m tests.e2e.screenshots
 
 # Everything that is generated from something else; `make check` fails where it is out of date.
 generate: $(VENV)/.ready frontend/node_modules/.ready
