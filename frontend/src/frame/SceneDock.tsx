@@ -54,6 +54,9 @@ export function SceneDock() {
   );
 }
 
+const RELOAD_MS = 10_000;
+const UNSEEN_MS = 60_000;
+
 enum Link {
   Loading = "loading",
   Up = "up",
@@ -64,18 +67,24 @@ function SceneView() {
   const t = useTexts();
   const [, update] = usePageSearch();
   const ready = useIdle();
+  const looked = useLookedAt();
   const frame = useRef<HTMLIFrameElement>(null);
   const labels = useRef<LabelPlacer>(null);
   const [link, setLink] = useState(Link.Loading);
   const [freed, setFreed] = useState(false);
+  // The frame's script tells that it is there before the frame counts as loaded: what is silent is no 3D view.
+  const alive = useRef(false);
+  const [attempt, setAttempt] = useState(0);
   const view = useView();
   // The frame gets its first view by its address; what changes later it is told, without being loaded again.
   const [address] = useState(() => addressOf(view));
 
   const select = (blade: number | null) => update({ blade: blade === null ? undefined : String(blade) });
   useSceneMessages(frame, (message) => {
-    if (message.hubside === "ready") tellScene(frame.current, view);
-    else if (message.hubside === "link") setLink(message.up ? Link.Up : Link.Lost);
+    if (message.hubside === "ready") {
+      alive.current = true;
+      tellScene(frame.current, view);
+    } else if (message.hubside === "link") setLink(message.up ? Link.Up : Link.Lost);
     else if (message.hubside === "select") select(message.blade);
     else if (message.hubside === "freed") setFreed(true);
     else labels.current?.place(message);
@@ -87,20 +96,30 @@ function SceneView() {
     tellScene(frame.current, { ...view, camera }, true);
     update({ camera: camera === "front" ? undefined : camera });
   };
-  // The frame is of our own origin: Esc must stop there as well.
-  const listen = () =>
+  const loaded = () => {
+    // The frame is of our own origin: Esc must stop there as well.
     frame.current?.contentWindow?.addEventListener("keydown", stopOnEscape, { capture: true });
+    if (!alive.current) setLink(Link.Lost);
+    alive.current = false;
+  };
+  useEffect(() => {
+    if (link !== Link.Lost) return;
+    // A view that was there connects again by itself within a second or two; else all of it is asked for anew.
+    const again = setTimeout(() => setAttempt((before) => before + 1), RELOAD_MS);
+    return () => clearTimeout(again);
+  }, [link, attempt]);
   return (
     <>
       <div className={`${classes.body} bench`} data-link={link} data-theme={view.theme}>
         {link === Link.Loading && <div className={classes.wait}>{t("page.scene.loading")}</div>}
-        {ready && (
+        {ready && looked && (
           <iframe
+            key={attempt}
             ref={frame}
             title={t("page.scene.label")}
             src={address}
             data-testid="scene"
-            onLoad={listen}
+            onLoad={loaded}
           />
         )}
         <Labels ref={labels} camera={view.camera} selected={view.selected} onSelect={select} />
@@ -193,6 +212,25 @@ function GhostSwitch({ on, onChange }: { on: boolean; onChange: (on: boolean) =>
       </ActionIcon>
     </Tooltip>
   );
+}
+
+/** False once nobody has seen the page for a while: a picture that nobody sees is not made. */
+function useLookedAt(): boolean {
+  const [looked, setLooked] = useState(true);
+  useEffect(() => {
+    let leaving: ReturnType<typeof setTimeout> | undefined;
+    const look = () => {
+      clearTimeout(leaving);
+      if (document.hidden) leaving = setTimeout(() => setLooked(false), UNSEEN_MS);
+      else setLooked(true);
+    };
+    document.addEventListener("visibilitychange", look);
+    return () => {
+      clearTimeout(leaving);
+      document.removeEventListener("visibilitychange", look);
+    };
+  }, []);
+  return looked;
 }
 
 /** True once the browser has nothing better to do: the page itself comes first. */
