@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import re
+import subprocess
+import sys
 
 import pytest
 
 from bench import __main__ as command
 from bench import latency, record
+from bench._cpu import tree_cpu_s
 from bench._load import PMC_NODES, frames, position_of
 from bench._result import Result
 
@@ -64,3 +67,15 @@ def test_the_last_line_gives_the_verdict(
     last = capsys.readouterr().out.splitlines()[-1]
     assert CLOSING.match(last)
     assert last.endswith(word)
+
+
+def test_the_processor_time_of_a_process_counts_what_it_started() -> None:
+    burn = "import time\nwhile time.process_time() < 0.3: pass\nprint(flush=True)\ninput()"
+    outer = f"import subprocess, sys\nsubprocess.run([sys.executable, '-c', {burn!r}])"
+    with subprocess.Popen([sys.executable, "-c", outer], stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        process.stdout.readline()
+        times = tree_cpu_s(process.pid)
+        process.communicate(b"\n", timeout=30)
+    assert len(times) == 2
+    assert sum(times.values()) - times[process.pid] >= 0.25
