@@ -2,8 +2,8 @@
 
 A start is warm: the second one and later, Python's bytecode is there as after an installation. Time runs from starting
 the process to the moment when the page shows the angles of all three blades; the browser runs already, with an empty
-profile for each start, and opens the address as soon as it is printed. Idle is the demo's whole process tree, server and
-twins, with one page open on it; the browser is not counted.
+profile for each start, and opens the address as soon as it is printed. Idle is the demo's whole process tree, server
+and twins, with one page open on it; the browser is not counted.
 
 No peer does this: ratio = limit / ours, the worse of both.
 """
