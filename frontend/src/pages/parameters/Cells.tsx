@@ -5,11 +5,10 @@ import { useCell } from "../../live/live";
 import type { ParameterRow } from "../../model/rows";
 import { type DeviceContext, limitText, lineOf, shownOf } from "../../model/shown";
 import { defaultOf, isHex, quantityOf } from "../../model/values";
-import { dateAndTime } from "../../ui/format";
 import { isUnsaved } from "./cellValue";
 import { Column, type ColumnSpec } from "./columns";
 import { useBenchOfTable } from "./context";
-import { lastChangeOf } from "./history";
+import { detailsOf, lastChangeOf } from "./history";
 import classes from "./Parameters.module.css";
 import { ValueCell, type ValueCellProps } from "./ValueCell";
 
@@ -151,15 +150,13 @@ function ChangedCell({ address, t }: { address: string; t: Texts }) {
   const { devices, side, nameOf } = useBenchOfTable();
   const last = lastChangeOf(address, devices);
   if (last === null) return <span className="dim">{DASH}</span>;
-  const { change, slug } = last;
-  const when = dateAndTime(change.t_ns / 1e6);
-  const details = { when, person: change.person, was: change.was, now: change.now, device: nameOf(slug) };
+  const details = { ...detailsOf(last.change, t), device: nameOf(last.slug) };
   return (
     <span
       className={`${classes.clip} dim`}
       title={t(side ? "page.history.line_of" : "page.history.line", details)}
     >
-      {when} {change.person}
+      {details.when} {details.person}
     </span>
   );
 }

@@ -1,11 +1,11 @@
+import { useQueries } from "@tanstack/react-query";
 import type { EntryDoc } from "../../api/types";
 import { restsOn } from "../../model/values";
 import { type ParameterRow, titleOf } from "../../model/rows";
 import { limitText } from "../../model/shown";
 import { isHex, quantityOf } from "../../model/values";
-import { dateAndTime } from "../../ui/format";
 import { useBenchOfTable, useDevice } from "./context";
-import { changesOf } from "./history";
+import { detailsOf, historyQuery } from "./history";
 import classes from "./Parameters.module.css";
 import { entriesOf } from "./staging";
 
@@ -88,8 +88,9 @@ const MOST_CHANGES = 20;
 function History({ entry }: { entry: EntryDoc }) {
   const { t } = useDevice();
   const { devices, nameOf } = useBenchOfTable();
+  const found = useQueries({ queries: devices.map(({ slug }) => historyQuery(slug, entry.address)) });
   const changes = devices
-    .flatMap(({ slug }) => changesOf(slug, entry.address).map((change) => ({ slug, change })))
+    .flatMap(({ slug }, at) => (found[at]?.data ?? []).map((change) => ({ slug, change })))
     .sort((a, b) => b.change.t_ns - a.change.t_ns)
     .slice(0, MOST_CHANGES);
   return (
@@ -100,10 +101,7 @@ function History({ entry }: { entry: EntryDoc }) {
         {changes.map(({ slug, change }) => (
           <li key={`${slug} ${change.t_ns}`}>
             {t(devices.length > 1 ? "page.history.line_of" : "page.history.line", {
-              when: dateAndTime(change.t_ns / 1e6),
-              person: change.person,
-              was: change.was,
-              now: change.now,
+              ...detailsOf(change, t),
               device: nameOf(slug),
             })}
           </li>

@@ -3,13 +3,10 @@ import { useMutation, useQuery } from "@tanstack/react-query";
 import { useCallback, useMemo } from "react";
 import { get, send } from "../../api/client";
 import { queryClient } from "../../api/queries";
+import type { Favourites } from "../../api/types";
 import { useTexts } from "../../texts/texts";
 import { notify } from "../../ui/notices";
 import { storyOf } from "../../ui/problem";
-
-interface Favourites {
-  addresses: string[];
-}
 
 const pathOf = (descriptionId: string) => `/api/favourites/${descriptionId}`;
 

@@ -3,47 +3,29 @@ import { queryOptions, useQueries } from "@tanstack/react-query";
 import { useEffect } from "react";
 import { get } from "../../api/client";
 import { queryClient } from "../../api/queries";
+import type { Details, ParameterChange, ParameterChanges } from "../../api/types";
 import { store } from "../../live/live";
 import type { DeviceContext } from "../../model/shown";
-
-/** One change; `was` and `now` are texts as they were shown then. */
-export interface ParameterChange {
-  address: string;
-  t_ns: number;
-  person: string;
-  was: string;
-  now: string;
-}
-
-type Changes = ReadonlyMap<string, readonly ParameterChange[]>;
+import type { Translate } from "../../texts/texts";
+import { dateAndTime } from "../../ui/format";
 
 const keyOf = (slug: string) => ["changes", slug];
+const pathOf = (slug: string) => `/api/live/devices/${slug}/changes`;
 
-const changesQuery = (slug: string) =>
+/** The last change of every parameter of a device. */
+const lastQuery = (slug: string) =>
   queryOptions({
-    queryKey: keyOf(slug),
-    queryFn: async ({ signal }): Promise<Changes> => {
-      const { changes } = await get<{ changes: ParameterChange[] }>(
-        `/api/live/devices/${slug}/changes`,
-        signal,
-      );
-      return byAddress(changes);
-    },
+    queryKey: [...keyOf(slug), "last"],
+    queryFn: async ({ signal }) => (await get<ParameterChanges>(pathOf(slug), signal)).last,
   });
 
-/** The newest first for each address. */
-export function byAddress(changes: readonly ParameterChange[]): Changes {
-  const found = new Map<string, ParameterChange[]>();
-  for (const change of [...changes].sort((a, b) => b.t_ns - a.t_ns)) {
-    const list = found.get(change.address);
-    if (list) list.push(change);
-    else found.set(change.address, [change]);
-  }
-  return found;
-}
-
-export const changesOf = (slug: string, address: string): readonly ParameterChange[] =>
-  queryClient.getQueryData<Changes>(keyOf(slug))?.get(address) ?? [];
+/** All changes of one parameter, the newest first. */
+export const historyQuery = (slug: string, address: string) =>
+  queryOptions({
+    queryKey: [...keyOf(slug), "of", address],
+    queryFn: async ({ signal }) =>
+      (await get<ParameterChanges>(`${pathOf(slug)}?address=${encodeURIComponent(address)}`, signal)).history,
+  });
 
 export interface LastChange {
   slug: string;
@@ -54,18 +36,27 @@ export interface LastChange {
 export function lastChangeOf(address: string, devices: readonly DeviceContext[]): LastChange | null {
   let last: LastChange | null = null;
   for (const { slug } of devices) {
-    const [change] = changesOf(slug, address);
+    const change = queryClient.getQueryData(lastQuery(slug).queryKey)?.[address];
     if (change && (last === null || change.t_ns > last.change.t_ns)) last = { slug, change };
   }
   return last;
 }
 
-const WRITTEN = "journal.written";
+/** What fills the texts about a change. Another master has no name. */
+export function detailsOf(change: ParameterChange, t: Translate): Details & { when: string; person: string } {
+  const { t_ns, was, now, source } = change;
+  const person = source === "ours" ? change.person : t("page.history.other_master");
+  return { when: dateAndTime(t_ns / 1e6), person, was, now };
+}
 
-/** Loads the changes of the devices, and again after every write; gives a number that grows with what is known. */
+const WRITTEN = "journal.written";
+/** The bench keeps a change a moment after it tells the event. */
+const KEPT_MS = 500;
+
+/** Loads the last changes of the devices, and again after every write; grows with what is known. */
 export function useChanges(slugs: readonly string[]): number {
-  const versions = useQueries({
-    queries: slugs.map((slug) => changesQuery(slug)),
+  const version = useQueries({
+    queries: slugs.map((slug) => lastQuery(slug)),
     combine: (results) => results.reduce((sum, one) => sum + one.dataUpdatedAt, 0),
   });
   useEffect(() => {
@@ -73,10 +64,13 @@ export function useChanges(slugs: readonly string[]): number {
     return store.subscribe("events", () => {
       const fresh = store.events.filter((one) => one.id > seen);
       seen = Math.max(seen, ...fresh.map((one) => one.id));
-      for (const one of fresh)
-        if (one.text_key === WRITTEN && one.device !== null)
-          void queryClient.invalidateQueries({ queryKey: keyOf(one.device) });
+      const devices = new Set(fresh.filter((one) => one.text_key === WRITTEN).map((one) => one.device));
+      if (devices.size === 0) return;
+      setTimeout(() => {
+        for (const slug of devices)
+          if (slug !== null) void queryClient.invalidateQueries({ queryKey: keyOf(slug) });
+      }, KEPT_MS);
     });
   }, []);
-  return versions;
+  return version;
 }
