@@ -46,12 +46,12 @@ class FileList(Generic[_T]):
             found = sorted(self._stats(), key=lambda item: item[2], reverse=True)
             self._known = {name: self._known[name] for name, _, _ in found if name in self._known}
             read_one = False
-            listed = []
+            listed: list[Listed[_T]] = []
             for name, size, modified_ns in found:
                 known = self._known.get(name)
                 if known is None or known[:2] != (size, modified_ns):
-                    if read_one and time.monotonic() > until_s:
-                        listed.append(Listed[_T](name, size, modified_ns, None))
+                    if read_one and time.monotonic() >= until_s:
+                        listed.append(Listed(name, size, modified_ns, None))
                         continue
                     read_one = True
                     known = self._known[name] = size, modified_ns, self._read(self.folder / name)

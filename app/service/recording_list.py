@@ -164,7 +164,9 @@ def attachment(path: Path, name: str) -> AttachedFile | None:
 
 
 def _summary(recording: Recording) -> Summary:
-    info, identity, span, totals = recording.info, recording.identity, recording.span_ns, recording.totals
+    info, identity, span = recording.info, recording.identity, recording.span_ns
+    # An archive tells its totals before its frames: cut off, it would claim what it no longer holds.
+    totals = recording.totals if recording.finished else None
     frames = sum(count for topic, count in recording.topics.items() if topic not in FIXED_TOPICS)
     return Summary(
         turbine=info.turbine,

@@ -59,7 +59,7 @@ async def recordings(bench: BenchOf, all_of_them: RecordingsOf) -> RecordingList
 async def recording(bench: BenchOf, all_of_them: RecordingsOf, name: str) -> RecordingDoc:
     """What one recording holds beside its frames; of the one that is being written only where it lies."""
     path = _known(all_of_them, name)
-    if path == _live_file(bench):
+    if _is_live(bench, path):
         return RecordingDoc(
             name=name, path=str(path), state="live", summary=None,
             metadata={}, topics={}, attachments=[], damages=[], losses=[],
@@ -72,9 +72,7 @@ async def recording(bench: BenchOf, all_of_them: RecordingsOf, name: str) -> Rec
         summary=_summary(found.look.summary),
         metadata={title: dict(table) for title, table in found.metadata.items()},
         topics=dict(found.topics),
-        attachments=[
-            AttachmentRef(name=n, media_type=kind, size_bytes=size) for n, kind, size in found.attachments
-        ],
+        attachments=[AttachmentRef(name=n, media_type=kind, size_bytes=size) for n, kind, size in found.attachments],
         damages=[DamageRef(offset=at, length=size, reason=why, detail=text) for at, size, why, text in found.damages],
         losses=[
             LossRef(t_ns=t_ns, text_key=f"recording.event.{kind.value}", details={"bus": bus, **_plain(more)})
@@ -87,7 +85,7 @@ async def recording(bench: BenchOf, all_of_them: RecordingsOf, name: str) -> Rec
 async def download_recording(bench: BenchOf, all_of_them: RecordingsOf, name: str) -> Response:
     """The file; of the one that is being written what it holds now."""
     path = _known(all_of_them, name)
-    if path != _live_file(bench):
+    if not _is_live(bench, path):
         return FileResponse(path, media_type=MCAP, filename=path.name)
     size = path.stat().st_size
     headers = {"Content-Disposition": f'attachment; filename="{path.name}"', "Content-Length": str(size)}
@@ -118,6 +116,11 @@ def _live_file(bench: Bench) -> Path | None:
     connection = bench.connection
     recording = None if connection is None else connection.recording
     return None if recording is None else recording.status().file
+
+
+def _is_live(bench: Bench, path: Path) -> bool:
+    live = _live_file(bench)
+    return live is not None and live.name == path.name
 
 
 def _first_bytes(path: Path, size: int) -> Iterator[bytes]:
