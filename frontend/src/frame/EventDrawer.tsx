@@ -1,15 +1,17 @@
-import { TextInput } from "@mantine/core";
+import { ActionIcon, SegmentedControl, TextInput, Tooltip } from "@mantine/core";
 import {
   IconAlertOctagon,
   IconAlertTriangle,
+  IconArrowsVertical,
   IconChevronDown,
   IconChevronUp,
+  IconDownload,
   IconInfoCircle,
 } from "@tabler/icons-react";
-import { useState } from "react";
 import type { EventData } from "../api/types";
 import { useEvents } from "../live/live";
 import type { NumberedEvent } from "../live/store";
+import { csvOf, download } from "../pages/parameters/export";
 import { type Translate, useTexts } from "../texts/texts";
 import { useDeviceName } from "../ui/devices";
 import { timeOfDay } from "../ui/format";
@@ -19,6 +21,10 @@ import { usePageSearch } from "./search";
 
 const SEVERITY_ICONS = { info: IconInfoCircle, warning: IconAlertTriangle, error: IconAlertOctagon };
 const SEVERITY_TONES = { info: "dim", warning: "tone-warning", error: "tone-error" };
+
+/** From which severity on events are shown; the order is that of urgency. */
+const LEAST = ["info", "warning", "error"] as const;
+const TALL = "tall";
 
 const textOf = (event: EventData, t: Translate) => t(event.text_key, event.details);
 
@@ -69,17 +75,28 @@ function Severity({ severity }: { severity: EventData["severity"] }) {
 function EventTable({ events }: { events: readonly NumberedEvent[] }) {
   const t = useTexts();
   const nameOf = useDeviceName();
-  const [filter, setFilter] = useState("");
-  const wanted = filter.trim().toLowerCase();
+  const [search, update] = usePageSearch();
+  const least = LEAST.find((one) => one === search.severity) ?? "info";
+  const wanted = (search.eventq ?? "").trim().toLowerCase();
   const shown = events
+    .filter((event) => LEAST.indexOf(event.severity) >= LEAST.indexOf(least))
     .map((event) => ({
       event,
       text: textOf(event, t),
       device: event.device === null ? "–" : nameOf(event.device),
     }))
     .filter((line) => `${line.text} ${line.device}`.toLowerCase().includes(wanted));
+  const lines = () => [
+    ["time", "severity", "device", "text"].map((one) => t(`page.events.${one}`)),
+    ...shown.map(({ event, text, device }) => [
+      new Date(event.t_ns / 1e6).toISOString(),
+      t(`page.severity.${event.severity}`),
+      device,
+      text,
+    ]),
+  ];
   return (
-    <div className={`${classes.eventBody} bench`}>
+    <div className={`${classes.eventBody} bench`} data-tall={search.drawer === TALL}>
       <table className={classes.eventTable}>
         <thead>
           <tr>
@@ -87,12 +104,43 @@ function EventTable({ events }: { events: readonly NumberedEvent[] }) {
             <th className={classes.eventSeverity}>{t("page.events.severity")}</th>
             <th className={classes.eventDevice}>{t("page.events.device")}</th>
             <th>
-              <TextInput
-                placeholder={t("page.events.filter")}
-                aria-label={t("page.events.filter")}
-                value={filter}
-                onChange={(event) => setFilter(event.currentTarget.value)}
-              />
+              <div className={classes.eventTools}>
+                <TextInput
+                  className={classes.eventFilter ?? ""}
+                  placeholder={t("page.events.filter")}
+                  aria-label={t("page.events.filter")}
+                  value={search.eventq ?? ""}
+                  onChange={(event) => update({ eventq: event.currentTarget.value })}
+                  data-testid="event-filter"
+                />
+                <SegmentedControl
+                  size="xs"
+                  value={least}
+                  onChange={(chosen) => update({ severity: chosen === "info" ? undefined : chosen })}
+                  data={LEAST.map((one) => ({ value: one, label: t(`page.events.least_${one}`) }))}
+                  aria-label={t("page.events.least")}
+                  data-testid="event-severity"
+                />
+                <Tooltip label={t("page.events.taller")}>
+                  <ActionIcon
+                    aria-label={t("page.events.taller")}
+                    aria-pressed={search.drawer === TALL}
+                    onClick={() => update({ drawer: search.drawer === TALL ? undefined : TALL })}
+                    data-testid="event-taller"
+                  >
+                    <IconArrowsVertical size={17} aria-hidden />
+                  </ActionIcon>
+                </Tooltip>
+                <Tooltip label={t("page.events.export")}>
+                  <ActionIcon
+                    aria-label={t("page.events.export")}
+                    onClick={() => download("hubside-events.csv", csvOf(lines()))}
+                    data-testid="event-export"
+                  >
+                    <IconDownload size={17} aria-hidden />
+                  </ActionIcon>
+                </Tooltip>
+              </div>
             </th>
           </tr>
         </thead>

@@ -45,7 +45,7 @@ export interface PageSearch {
   compare?: "different";
   /** The procedure that is open. */
   procedure?: string;
-  /** Filter and least severity of the event drawer, and its height in pixels. */
+  /** Filter and least severity of the event drawer, and whether it is "tall". */
   eventq?: string;
   severity?: string;
   drawer?: string;
