@@ -30,7 +30,8 @@ export function Shell() {
 function Gate({ wanted }: { wanted: Language | undefined }) {
   const session = useQuery({
     ...sessionQuery,
-    refetchInterval: (query) => (query.state.data ? false : RETRY_MS),
+    // While somebody types name and password nothing is asked: asking anew would take the form away.
+    refetchInterval: ({ state }) => (state.data || wantsLogin(state.error) ? false : RETRY_MS),
   });
   const language = wanted ?? session.data?.locale ?? browserLanguage();
   const texts = useQuery({
@@ -59,20 +60,26 @@ function Gate({ wanted }: { wanted: Language | undefined }) {
     );
   }
   const boot = bootTranslator(language);
-  if (session.error instanceof Problem && session.error.doc.status === UNAUTHORISED) {
-    if (session.error.doc.code !== LOGIN_NEEDED) return <NoAccess t={boot} />;
+  if (wantsLogin(session.error)) {
     return (
       <Suspense>
         <Login t={boot} />
       </Suspense>
     );
   }
+  if (session.error instanceof Problem && session.error.doc.status === UNAUTHORISED)
+    return <NoAccess t={boot} />;
   if (session.error ?? texts.error) return <NoAccess t={boot} unreachable />;
   return (
     <Center h="100%">
       <Loader aria-label={boot("page.boot.loading")} />
     </Center>
   );
+}
+
+/** Users are set up, so that nothing but a login opens the page. */
+function wantsLogin(error: unknown): boolean {
+  return error instanceof Problem && error.doc.code === LOGIN_NEEDED;
 }
 
 function browserLanguage(): Language {
