@@ -73,7 +73,7 @@ DEMAND_REACHED_DEG: Final = 0.3
 class RotorPose:
     """Rotor and wind. None: not known; a rotor of unknown azimuth stands with blade 1 upwards.
 
-    ``wind_deg`` is where the wind comes from, from the nacelle's direction, positive from the right of who looks upwind.
+    ``wind_deg`` is where the wind comes from, off the nacelle's direction, positive from the right looking upwind.
     """
 
     azimuth_deg: float | None = None
