@@ -85,9 +85,12 @@ async def read_device(
 async def read_devices(
     pairs: Iterable[tuple[Driver, Target]], on_progress: DeviceProgress | None = None
 ) -> list[ReadReport]:
-    """Read many devices completely, all nodes at a time. Raises BusLostError."""
-    async with asyncio.TaskGroup() as group:
-        tasks = [group.create_task(read_device(driver, target, None, on_progress)) for driver, target in pairs]
+    """Read many devices completely, all nodes at a time. Raises BusLostError, ConsentError."""
+    try:
+        async with asyncio.TaskGroup() as group:
+            tasks = [group.create_task(read_device(driver, target, None, on_progress)) for driver, target in pairs]
+    except ExceptionGroup as failed:  # the bus is lost for all of them at once: one of them tells it
+        raise failed.exceptions[0] from failed
     return [task.result() for task in tasks]
 
 
