@@ -7,7 +7,16 @@ import { useTexts } from "../../texts/texts";
 import { useDeviceName } from "../../ui/devices";
 import { timeOfDay } from "../../ui/format";
 import classes from "./Bus.module.css";
-import { bytesOf, idText, noteTexts, objectName, partnerOf, serviceText, valueText } from "./lines";
+import {
+  bytesOf,
+  exactTime,
+  idText,
+  noteTexts,
+  objectName,
+  partnerOf,
+  serviceText,
+  valueText,
+} from "./lines";
 
 interface Props {
   line: TraceLine;
@@ -41,8 +50,7 @@ export function FrameDetail({ line, rows, onPick }: Props) {
       </header>
       <dl>
         <Fact name="time">
-          {timeOfDay(line.t_ns / 1e6)}
-          <span className="dim"> {BigInt(line.t_ns).toString()} ns</span>
+          <span title={`${BigInt(line.t_ns).toString()} ns`}>{exactTime(line.t_ns)}</span>
         </Fact>
         {previous && <Fact name="since_previous">{ms(line.t_ns - previous.t_ns)} ms</Fact>}
         <Fact name="identifier">

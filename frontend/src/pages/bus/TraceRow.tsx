@@ -78,12 +78,14 @@ function Meaning({ line, query, t }: { line: TraceLine; query: string; t: Transl
 
 function Item({ item, query, t }: { item: TraceItem; query: string; t: Translate }) {
   return (
-    <span>
+    <span className={classes.item}>
       <code>
         <Marked text={item.address} query={query} />
-      </code>{" "}
-      <Marked text={objectName(item, t)} query={query} />
-      {item.text !== null && <b> {valueText(item, t)}</b>}
+      </code>
+      <span className={classes.clip}>
+        <Marked text={objectName(item, t)} query={query} />
+      </span>
+      {item.text !== null && <b>{valueText(item, t)}</b>}
     </span>
   );
 }

@@ -1,15 +1,18 @@
 import { IconPlayerPause, IconPlayerPlay } from "@tabler/icons-react";
+import { usePageSearch } from "../../frame/search";
 import { useLink } from "../../live/live";
 import { figure } from "../../model/values";
 import { type Translate, useTexts } from "../../texts/texts";
 import { timeOfDay } from "../../ui/format";
 import classes from "./Bus.module.css";
+import { isFiltered } from "./filter";
 import type { useTrace } from "./useTrace";
 
 /** Says what share of the traffic is on the screen, where it comes from, and how much came since the pause. */
 export function TraceStatus({ trace }: { trace: ReturnType<typeof useTrace> }) {
   const t = useTexts();
   const recording = useLink()?.recording.state === "on";
+  const [search] = usePageSearch();
   const { view, paused } = trace;
   const number = (per: number) => figure(per, 0, t.language);
   const { rates } = view;
@@ -18,7 +21,7 @@ export function TraceStatus({ trace }: { trace: ReturnType<typeof useTrace> }) {
         shown: number(rates.shown),
         matched: number(rates.matched),
       })
-    : t("trace.page.whole_all", { rate: number(rates.seen) });
+    : t(isFiltered(search) ? "trace.page.whole" : "trace.page.whole_all", { rate: number(rates.seen) });
   return (
     <footer className={classes.status} data-testid="trace-status">
       <span data-sampled={rates.sampled} className={classes.share} data-testid="trace-share">

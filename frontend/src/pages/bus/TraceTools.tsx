@@ -117,11 +117,7 @@ function Typed({ name, label, hint, width, icon }: TypedProps) {
   return (
     <TextInput
       aria-label={t(`trace.page.${label}`)}
-      placeholder={
-        width === undefined
-          ? t(`trace.page.${hint}`)
-          : `${t(`trace.page.${label}`)}: ${t(`trace.page.${hint}`)}`
-      }
+      placeholder={t(`trace.page.${width === undefined ? hint : label}`)}
       title={`${t(`trace.page.${label}`)}: ${t(`trace.page.${hint}`)}`}
       className={width === undefined ? (classes.grow ?? "") : ""}
       leftSection={icon}

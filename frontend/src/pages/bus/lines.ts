@@ -35,7 +35,21 @@ export function valueText(item: TraceItem, t: Translate): string {
 }
 
 export function noteTexts(line: TraceLine, t: Translate): string[] {
-  return line.notes.map((note) => t(note.key, note.details));
+  return line.notes.map((note) => t(note.key, localised(note.details, t)));
+}
+
+function localised(details: TraceLine["notes"][number]["details"], t: Translate): Record<string, unknown> {
+  const shown = ([name, detail]: [string, unknown]): [string, unknown] => [
+    name,
+    typeof detail === "string" && NUMBER.test(detail) ? localise(detail, t.language) : detail,
+  ];
+  return Object.fromEntries(Object.entries(details).map(shown));
+}
+
+/** `14:03:22.118734`: to the microsecond. */
+export function exactTime(tNs: number): string {
+  const micros = (BigInt(tNs) / 1000n) % 1000n;
+  return `${timeOfDay(tNs / 1e6)}${micros.toString().padStart(3, "0")}`;
 }
 
 /** All that a row means, as one text. */
