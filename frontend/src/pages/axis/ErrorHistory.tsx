@@ -14,7 +14,8 @@ import { rawAt, useUnheard } from "../../ui/reading";
 import classes from "./Axis.module.css";
 
 const ENTRIES = [1, 2, 3, 4, 5, 6, 7, 8];
-const COUNT = "1003:00";
+/** Sub-index 0: the number of entries. */
+const COUNT = "1003";
 const entryOf = (at: number) => `1003:0${at}`;
 const stampOf = (at: number) => `2030:0${at}`;
 const LOW_WORD = 0x10000;

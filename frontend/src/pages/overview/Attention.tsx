@@ -33,8 +33,9 @@ export function Attention() {
   const watched = useWatched(turbine, t);
   const more = link?.state === "connected" ? deviceFindings(watched) : [];
   const findings = findingsOf({ turbine, link, nodes: useNodes(), axes: useAxes(), nowMs, more });
-  // A page that hears nothing may not say that all is well.
-  const allWell = hearing && findings.length === 0;
+  // A page that hears nothing, or does not know the values yet, may not say that all is well.
+  const known = watched.length > 0 && watched.length === placesOf(turbine).length;
+  const allWell = hearing && known && findings.length === 0;
   const shown = hearing ? findings.slice(0, all ? undefined : SHOWN) : [];
   const left = findings.length - SHOWN;
   return (
@@ -49,6 +50,7 @@ export function Attention() {
           <IconCircleCheck size={18} aria-hidden /> {t("page.attention.none")}
         </p>
       )}
+      {hearing && !known && findings.length === 0 && <p className="dim">{t("page.attention.not_known")}</p>}
       <ul>
         {shown.map((finding) => (
           <FindingLine key={finding.id} finding={finding} />
