@@ -179,11 +179,8 @@ function Body<Row>({ rows, columns, tracks, idOf, onOpen, selected }: BodyProps<
     if (step !== undefined) go(current + step);
     else if (event.key === "Home") go(0);
     else if (event.key === "End") go(rows.length - 1);
-    else if (
-      event.key === "Enter" &&
-      event.target === event.currentTarget.querySelector(`[data-at="${current}"]`)
-    ) {
-      const row = rows[current];
+    else if (event.key === "Enter" && event.target instanceof HTMLElement && event.target.role === "row") {
+      const row = rows[Number(event.target.dataset.at)];
       if (row !== undefined) onOpen?.(row);
     } else return;
     event.preventDefault();
@@ -206,6 +203,7 @@ function Body<Row>({ rows, columns, tracks, idOf, onOpen, selected }: BodyProps<
               tabIndex={index === current ? 0 : -1}
               className={classes.row}
               style={{ gridTemplateColumns: tracks, transform: `translateY(${start}px)`, height: ROW_PX }}
+              onFocus={() => setAt(index)}
               onClick={() => {
                 setAt(index);
                 onOpen?.(row);
