@@ -2,7 +2,7 @@ import { Alert, Button, Progress } from "@mantine/core";
 import { IconAlertTriangle, IconChevronDown, IconClockOff, IconRefresh } from "@tabler/icons-react";
 import { useMemo } from "react";
 import type { EntryDoc, Job } from "../../api/types";
-import { store, useDeviceVersion, useNodes, useServerNow } from "../../live/live";
+import { store, useNodes, useServerNow } from "../../live/live";
 import { useTexts } from "../../texts/texts";
 import { age } from "../../ui/format";
 import { heartbeatOf } from "../overview/nodes";
@@ -11,6 +11,7 @@ import { useDevice } from "./context";
 import classes from "./Parameters.module.css";
 import { type ReadAll, useReadAll, useReadAtFirstSight } from "./readAll";
 import { useSilent } from "./silent";
+import { useCoarseVersion } from "./versions";
 
 /** One line between tools and table: how far a reading is, or what is missing and the next step. */
 export function StateLine({ slug, name }: { slug: string; name: string | null }) {
@@ -104,7 +105,8 @@ function Silent({ slug, name }: { slug: string; name: string | null }) {
 function Missing({ slug, reading, name }: { slug: string; reading: ReadAll; name: string | null }) {
   const t = useTexts();
   const { doc } = useDevice();
-  const version = useDeviceVersion(slug);
+  const slugs = useMemo(() => [slug], [slug]);
+  const version = useCoarseVersion(slugs);
   const refused = reading.job?.failed;
   const missing = useMemo(
     () => missingOf(doc.entries, slug, new Set(refused?.map((failure) => failure.address))),

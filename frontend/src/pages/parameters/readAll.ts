@@ -1,14 +1,15 @@
 /** Reading the whole dictionary: one job a device at a time, kept beside the page so that changing rooms loses nothing. */
 import { useMutation, useQuery } from "@tanstack/react-query";
-import { useEffect } from "react";
+import { useEffect, useMemo } from "react";
 import { commands } from "../../api/client";
 import { jobQuery, queryClient } from "../../api/queries";
 import type { Job } from "../../api/types";
-import { store, useDeviceVersion } from "../../live/live";
+import { store } from "../../live/live";
 import { type Translate, useTexts } from "../../texts/texts";
 import { notify } from "../../ui/notices";
 import { storyOf } from "../../ui/problem";
 import { useSilent } from "./silent";
+import { useCoarseVersion } from "./versions";
 
 const offered = new Set<string>();
 
@@ -72,15 +73,16 @@ function tellFailed(error: unknown, t: Translate): void {
 
 /** The first time that a device without any known value is opened, it is read by itself. Never again after that. */
 export function useReadAtFirstSight(slug: string, reading: ReadAll): void {
-  const version = useDeviceVersion(slug);
+  const slugs = useMemo(() => [slug], [slug]);
+  const heard = useCoarseVersion(slugs) > 0;
   const silent = useSilent(slug);
   const { running, start } = reading;
   useEffect(() => {
-    if (version === 0 || silent || running || offered.has(slug)) return;
+    if (!heard || silent || running || offered.has(slug)) return;
     offered.add(slug);
     const known = [...(store.cells(slug)?.values() ?? [])].filter(
       (cell) => cell.known && cell.source === "sdo-read",
     );
     if (known.length === 0) start(null);
-  }, [version, silent, running, slug, start]);
+  }, [heard, silent, running, slug, start]);
 }

@@ -4,12 +4,18 @@ import type { EntryDoc, Raw } from "../../api/types";
 import { store } from "../../live/live";
 import type { Ground } from "../../model/findings";
 import type { DeviceContext } from "../../model/shown";
-import { type Change, keyOf, StagedStore, type StagedState } from "../../model/staged";
+import { type Change, type Keeper, keyOf, StagedStore, type StagedState } from "../../model/staged";
 import type { Lookup } from "../../model/values";
 import { rawOf } from "./cellValue";
 import type { Bench } from "./context";
 
-export const staged = new StagedStore(sessionStorage, () => Date.now());
+/** Asked for when it is used, as the code is also read where there is no browser. */
+const keeper: Keeper = {
+  getItem: (key) => sessionStorage.getItem(key),
+  setItem: (key, text) => sessionStorage.setItem(key, text),
+};
+
+export const staged = new StagedStore(keeper, () => Date.now());
 
 export function useStaged(): StagedState {
   return useSyncExternalStore(staged.subscribe, () => staged.state);

@@ -3,9 +3,9 @@ import { useCallback, useMemo, useRef, useSyncExternalStore } from "react";
 import { store, useHearing, useLink, useNodes } from "../../live/live";
 import type { DeviceContext } from "../../model/shown";
 
-const COARSE_MS = 500;
+const COARSE_MS = 1000;
 
-/** Grows with the values of these devices, at most twice a second: for what looks at all rows. */
+/** Grows with the values of these devices, at most once a second: for what looks at all rows. */
 export function useCoarseVersion(slugs: readonly string[]): number {
   const shown = useRef(0);
   const read = () => slugs.reduce((sum, slug) => sum + store.version(slug), 0);
