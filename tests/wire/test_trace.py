@@ -9,6 +9,7 @@ import pytest
 from app.errors import UsageError
 from app.model.address import Address
 from app.model.description_file import load_builtin
+from app.model.texts import LANGUAGES, load_texts
 from app.wire import sdo
 from app.wire.decoder import CanOpenDecoder
 from app.wire.emcy import emcy
@@ -332,3 +333,10 @@ def test_identifiers_are_counted_with_their_periods_and_rates() -> None:
     assert pdo.period_ns == pdo.shortest_ns == pdo.longest_ns == 100 * MS
     assert (beat.frames, beat.period_ns, beat.per_second) == (1, None, 0)
     assert table.copy().views(3 * second)[0].per_second == 5, "the last full second is the running one of before"
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_every_step_and_service_has_words(language: str) -> None:
+    texts = load_texts(language).flat
+    keys = [*(step.text_key for step in Step), *(f"trace.service.{service.value}" for service in Service)]
+    assert [key for key in keys if not texts.get(key)] == []
