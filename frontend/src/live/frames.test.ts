@@ -1,5 +1,5 @@
 import { beforeEach, describe, expect, it } from "vitest";
-import type { TraceBatch, TraceLine, TracePage } from "../api/trace";
+import type { TraceLine, TracePage } from "../api/trace";
 import { FrameStore, MAX_ROWS } from "./frames";
 
 let flushes: (() => void)[] = [];
@@ -13,10 +13,7 @@ const row = (tNs: number) => ({ t_ns: tNs }) as TraceLine;
 function batch(times: number[], nowMs: number, leftOut = 0, startNs = 1): void {
   total += times.length + leftOut;
   const counts = { seen: total, matched: total, sent: total - leftOut, left_out: leftOut };
-  store.take(
-    { id, start_t_ns: startNs, rows: times.map(row), invalid: null, ...counts },
-    nowMs,
-  );
+  store.take({ id, start_t_ns: startNs, rows: times.map(row), invalid: null, ...counts }, nowMs);
 }
 
 const times = () => store.view.rows.map((one) => one.t_ns);
