@@ -111,8 +111,8 @@ def test_blades_side_by_side_are_staged_written_and_taken_back(page: Page, demo:
         expect(cell).to_contain_text("50.0◦")
 
 
-def test_a_device_that_refuses_keeps_the_change_pending_and_says_why(page: Page, demo: str) -> None:
-    """The home offset needs homing mode. What was begun is told, the rest stays pending."""
+def test_what_the_device_would_refuse_is_stopped_in_the_review(page: Page, demo: str) -> None:
+    """The home offset needs homing mode and belongs to this machine: both are said, and nothing can be sent."""
     page.goto(at(demo, "device=wtg-07/blade-2/pmc&q=607C&edit=607C"))
     expect(page.get_by_test_id("value-607C")).to_contain_text("°", timeout=WAIT_MS)
     page.get_by_test_id("new-value").fill("0.50")

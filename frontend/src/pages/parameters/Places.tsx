@@ -34,16 +34,18 @@ export function Places({ entry, onTake }: { entry: EntryDoc; onTake: ((raw: Raw)
             <span className="dim">{note}</span>
           </dd>
           {onTake && raw !== null && name !== "pending" && (
-            <Button
-              size="compact-sm"
-              variant="subtle"
-              className={classes.take}
-              aria-label={t("page.entry.take_from", { place: t(`page.entry.${name}`) })}
-              onClick={() => onTake(raw)}
-              data-testid={`take-${name}`}
-            >
-              {t("page.entry.take")}
-            </Button>
+            <dd>
+              <Button
+                size="compact-sm"
+                variant="subtle"
+                className={classes.take}
+                aria-label={t("page.entry.take_from", { place: t(`page.entry.${name}`) })}
+                onClick={() => onTake(raw)}
+                data-testid={`take-${name}`}
+              >
+                {t("page.entry.take")}
+              </Button>
+            </dd>
           )}
         </div>
       ))}

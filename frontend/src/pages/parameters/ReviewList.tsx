@@ -104,7 +104,10 @@ function usePlans(places: readonly Place[]): DevicePlan[] {
   const bySlug = new Map<string, Change[]>();
   for (const change of changes.values())
     bySlug.set(change.device, [...(bySlug.get(change.device) ?? []), change]);
-  return [...bySlug].map(([slug, list]) => {
+  const order = places.map((place) => place.device.slug);
+  const slugs = [...bySlug.keys()].sort((a, b) => order.indexOf(a) - order.indexOf(b));
+  return slugs.map((slug) => {
+    const list = bySlug.get(slug) ?? [];
     const context = contexts.get(slug);
     const rows = context
       ? planOf(list, groundOf(context, role))

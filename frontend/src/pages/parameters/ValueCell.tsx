@@ -45,12 +45,14 @@ export function ValueCell(props: ValueCellProps) {
       type="button"
       tabIndex={-1}
       className={classes.value}
-      aria-label={t(open ? "page.table.edit" : "page.table.open", { name })}
-      aria-describedby={id}
+      aria-labelledby={`${id}-do ${id}`}
       data-testid={side ? `value-${device.slug}-${entry.address}` : `value-${entry.address}`}
       data-pending={change !== undefined}
       onClick={() => onEdit(entry.address, device.slug)}
     >
+      <span id={`${id}-do`} className="visually-hidden">
+        {t(open ? "page.table.edit" : "page.table.open", { name })}
+      </span>
       <span id={id} className={classes.cellText}>
         {change ? (
           <PendingText entry={entry} device={device} change={change} cell={cell} />
@@ -82,7 +84,10 @@ function PendingText({ entry, device, change, cell }: PendingProps) {
       data-refused={why !== null}
       title={why ?? t("page.table.pending_title", { value: lineOf(next) })}
     >
-      <s>{old}</s> → <b>{next.text}</b> <span aria-hidden>{why === null ? "✎" : "✕"}</span>
+      <s>{old}</s>
+      <span>{" → "}</span>
+      <b>{next.text}</b>
+      <span aria-hidden>{why === null ? " ✎" : " ✕"}</span>
       <span className="visually-hidden">
         {why === null ? t("page.table.pending") : t("page.table.refused", { reason: why })}
       </span>
@@ -120,6 +125,7 @@ function RamText({ entry, cell, device, nowMs, silent, side }: RamProps) {
       data-flash={fresh}
       data-stale={stale}
       data-known="true"
+      data-bits={shown.names.length > 0}
       title={valueTitle(raw, cell, nowMs, shown.names.length > 0 ? lineOf(shown) : "", device)}
     >
       <b>{shown.text}</b>
