@@ -130,7 +130,7 @@ function Tools() {
       <Tooltip label={t("page.tools.language")}>
         <ActionIcon
           w={58}
-          aria-label={t("page.tools.language")}
+          aria-label={`${language.toUpperCase()}: ${t("page.tools.language")}`}
           data-testid="language"
           onClick={() => update({ lang: language })}
         >

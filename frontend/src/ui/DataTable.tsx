@@ -130,19 +130,21 @@ function Head<Row>({ columns, tracks }: { columns: readonly TableColumn<Row>[]; 
             role="columnheader"
             aria-sort={column.id !== id ? "none" : descending ? "descending" : "ascending"}
           >
-            <button
-              type="button"
-              data-numeric={column.numeric}
-              onClick={() => update({ order: next(column.id) })}
-            >
-              {column.title}
-              {column.id === id &&
-                (descending ? (
-                  <IconArrowDown size={14} aria-hidden />
-                ) : (
-                  <IconArrowUp size={14} aria-hidden />
-                ))}
-            </button>
+            {column.title !== "" && (
+              <button
+                type="button"
+                data-numeric={column.numeric}
+                onClick={() => update({ order: next(column.id) })}
+              >
+                {column.title}
+                {column.id === id &&
+                  (descending ? (
+                    <IconArrowDown size={14} aria-hidden />
+                  ) : (
+                    <IconArrowUp size={14} aria-hidden />
+                  ))}
+              </button>
+            )}
           </div>
         ))}
       </div>

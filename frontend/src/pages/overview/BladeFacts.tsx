@@ -51,10 +51,13 @@ export function BladeFacts({ pmm, pmc }: Contexts) {
           <ReadingText context={pmm} address="3062" pace="slow" />
         </span>
       </Fact>
-      <div className={classes.temperatures} role="group" aria-label={t("page.card.temperatures")}>
-        {TEMPERATURES.map((spot) => (
-          <TemperatureLine key={spot.key} spot={spot} context={spot.on === PMM ? pmm : pmc} />
-        ))}
+      <div className={classes.temperatures}>
+        <dt className="visually-hidden">{t("page.card.temperatures")}</dt>
+        <dd>
+          {TEMPERATURES.map((spot) => (
+            <TemperatureLine key={spot.key} spot={spot} context={spot.on === PMM ? pmm : pmc} />
+          ))}
+        </dd>
       </div>
       <Fact name={t("page.card.brake")}>
         <Brake pmc={pmc} />

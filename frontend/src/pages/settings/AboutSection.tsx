@@ -32,7 +32,12 @@ export function AboutSection() {
           ))}
         </dl>
       </div>
-      <div className={classes.tableBox}>
+      <div
+        className={classes.tableBox}
+        tabIndex={0}
+        role="group"
+        aria-label={t("page.settings.about.libraries")}
+      >
         <table className={classes.table}>
           <caption className="visually-hidden">{t("page.settings.about.libraries")}</caption>
           <thead>

@@ -167,7 +167,7 @@ function AdapterRow({ adapter, open, onToggle }: RowProps) {
         <td>
           {adapter.turbines.join(", ") || "–"}{" "}
           {adapter.in_use && (
-            <Badge color="green.9" variant="filled" tt="none">
+            <Badge color="var(--hs-live)" variant="filled" tt="none">
               {t("page.settings.adapters.in_use")}
             </Badge>
           )}

@@ -107,7 +107,7 @@ function TurbineButton({ turbine, open, connected, onOpen }: ButtonProps) {
       data-testid={`turbine-${turbine.slug}`}
       rightSection={
         connected && (
-          <Badge color="green.9" variant="filled" tt="none">
+          <Badge color="var(--hs-live)" variant="filled" tt="none">
             {t("page.connect.is")}
           </Badge>
         )

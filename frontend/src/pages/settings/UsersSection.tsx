@@ -158,7 +158,7 @@ function UserRow({ user }: { user: User }) {
           />
         </td>
         <td>
-          <Badge color={user.disabled ? "gray.7" : "green.9"} variant="filled" tt="none">
+          <Badge color={user.disabled ? "gray.7" : "var(--hs-live)"} variant="filled" tt="none">
             {t(user.disabled ? "page.settings.users.disabled" : "page.settings.users.active")}
           </Badge>
         </td>
