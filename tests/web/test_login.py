@@ -107,7 +107,7 @@ async def test_wrong_names_and_passwords_are_told_alike(server: Server) -> None:
 async def test_failed_logins_must_wait_and_others_need_not(server: Server) -> None:
     await with_anna(server)
     await server.client.post("/api/users", json={**BEN, "role": "viewer"})
-    tries = []
+    tries: list[int] = []
     while len(tries) < 10 and 429 not in tries:
         tries.append((await server.stranger.post("/api/login", json={**BEN, "password": "guessing"})).status_code)
     assert tries[:4] == [401] * 4
