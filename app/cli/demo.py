@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import json
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -21,6 +22,8 @@ from app.model.bundled import bundled_folder
 from app.settings import TWIN_PORT
 
 END_S: Final = 20.0
+_TWINS_AT: Final = re.compile(r'(\[turbine\.wtg-07\.bus\.can0\][^\[]*?connection\s*=\s*)"[^"]*"')
+"""Where the bus of the example turbine is connected to."""
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -84,8 +87,10 @@ def _reason(twins: subprocess.Popen[str]) -> str:
 
 
 def _site(folder: Path, address: str) -> Path:
-    """A site file in ``folder``: the example turbine at the address of the twins."""
-    text = (bundled_folder("docs/sites", "sites") / "example.toml").read_text(encoding="utf-8")
+    """The demo's site file in ``folder``: its twins at ``address``, and whatever was added to it in the page."""
     path = folder / "demo-site.toml"
-    path.write_text(text.replace(f"socketcand:127.0.0.1:{TWIN_PORT}", address), encoding="utf-8")
+    text = path.read_text(encoding="utf-8") if path.exists() else ""
+    if not _TWINS_AT.search(text):
+        text = (bundled_folder("docs/sites", "sites") / "example.toml").read_text(encoding="utf-8")
+    path.write_text(_TWINS_AT.sub(rf'\1"{address}"', text), encoding="utf-8")
     return path

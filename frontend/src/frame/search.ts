@@ -17,7 +17,7 @@ export interface PageSearch {
   events?: "open";
   device?: string;
   q?: string;
-  /** Which parameters are shown: "changed", "different", "starred", "pending", separated by commas. */
+  /** Which parameters are shown: "changed", "different", "unsaved", "starred", "pending", separated by commas. */
   only?: string;
   /** All devices of the kind side by side. */
   view?: "side";

@@ -116,7 +116,7 @@ function unsavedFindings(watched: Watched): Finding[] {
     isUnsaved(entry, watched.cells.get(entry.address)),
   );
   if (entries.length === 0) return [];
-  const q = entries.length === 1 ? { q: entries[0]?.address ?? "" } : { only: "changed" };
+  const q = entries.length === 1 ? { q: entries[0]?.address ?? "" } : { only: "unsaved" };
   return [finding(watched, "warning", "unsaved", { count: entries.length }, q)];
 }
 

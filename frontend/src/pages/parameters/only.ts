@@ -3,7 +3,7 @@ import { store } from "../../live/live";
 import type { GroupTally, ParameterRow } from "../../model/rows";
 import type { StagedState } from "../../model/staged";
 import { keyOf } from "../../model/staged";
-import { differsFromDefault, rawOf } from "./cellValue";
+import { differsFromDefault, isUnsaved, rawOf } from "./cellValue";
 import type { Bench } from "./context";
 
 export enum Only {
@@ -11,6 +11,8 @@ export enum Only {
   Changed = "changed",
   /** Between the devices of the kind. */
   Different = "different",
+  /** RAM is not what is stored, in any of the devices shown: a save would keep it, a restart would lose it. */
+  Unsaved = "unsaved",
   Starred = "starred",
   Pending = "pending",
 }
@@ -50,6 +52,8 @@ export function filterOnly(
         differsFromDefault(entry, store.cell(slug, entry.address), node),
       ),
     [Only.Different]: ({ entry }) => isCompared(entry) && differsBetween(entry.address, slugs),
+    [Only.Unsaved]: ({ entry }) =>
+      bench.devices.some(({ slug }) => isUnsaved(entry, store.cell(slug, entry.address))),
     [Only.Starred]: ({ entry }) => bench.starred.has(entry.address),
     [Only.Pending]: ({ entry }) =>
       bench.devices.some(({ slug }) => staged.changes.has(keyOf(slug, entry.address))),
