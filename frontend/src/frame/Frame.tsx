@@ -10,6 +10,7 @@ import { Navigation } from "./Navigation";
 import { SceneDock } from "./SceneDock";
 import { TopBar } from "./TopBar";
 import { useEscapeStops } from "./stop";
+import { usePageTitle } from "./title";
 
 /** The frame of every page: who we are connected to above, rooms left, 3D right, events below. */
 export function Frame() {
@@ -18,6 +19,7 @@ export function Frame() {
   const mode = link?.state === "connected" ? link.mode : "none";
   const path = useRouterState({ select: (state) => state.location.pathname });
   useEscapeStops();
+  usePageTitle();
   return (
     <div className={classes.frame} data-deaf={deaf} data-mode={mode} data-page={path}>
       <TopBar />

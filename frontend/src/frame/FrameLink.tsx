@@ -3,7 +3,7 @@ import { Link } from "@tanstack/react-router";
 import { digitsOf } from "../api/trace";
 import { useTexts } from "../texts/texts";
 import classes from "./Frame.module.css";
-import { type PageSearch, readSearch } from "./search";
+import { type PageSearch, roomSearch } from "./search";
 
 /** From an event to the frame that told it, in the trace of the bus. */
 export function FrameLink({ tNs }: { tNs: number }) {
@@ -11,10 +11,7 @@ export function FrameLink({ tNs }: { tNs: number }) {
   return (
     <Link
       to="/bus"
-      search={(before: PageSearch) => {
-        const { lang, theme, scene, events } = before;
-        return readSearch({ lang, theme, scene, events, frame: digitsOf(tNs), paused: "1" });
-      }}
+      search={(before: PageSearch) => roomSearch(before, { frame: digitsOf(tNs), paused: "1" })}
       className={classes.frameLink}
       title={t("trace.page.jump_hint")}
       data-testid="event-frame"

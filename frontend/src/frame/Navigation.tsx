@@ -1,4 +1,5 @@
 import {
+  type Icon,
   IconAdjustmentsHorizontal,
   IconChecklist,
   IconFiles,
@@ -11,36 +12,40 @@ import {
 import { Link } from "@tanstack/react-router";
 import { useTexts } from "../texts/texts";
 import classes from "./Frame.module.css";
-import { type PageSearch, readSearch } from "./search";
+import { type RoomPath, ROOMS } from "./rooms";
+import { roomSearch } from "./search";
 
-const ROOMS = [
-  { to: "/", key: "overview", Icon: IconLayoutDashboard },
-  { to: "/axis", key: "axis", Icon: IconRotateClockwise2 },
-  { to: "/parameters", key: "parameters", Icon: IconAdjustmentsHorizontal },
-  { to: "/sets", key: "sets", Icon: IconFiles },
-  { to: "/recordings", key: "recordings", Icon: IconMovie },
-  { to: "/bus", key: "bus", Icon: IconTopologyBus },
-  { to: "/procedures", key: "procedures", Icon: IconChecklist },
-  { to: "/settings", key: "settings", Icon: IconSettings },
-] as const;
+const ICONS: Record<RoomPath, Icon> = {
+  "/": IconLayoutDashboard,
+  "/axis": IconRotateClockwise2,
+  "/parameters": IconAdjustmentsHorizontal,
+  "/sets": IconFiles,
+  "/recordings": IconMovie,
+  "/bus": IconTopologyBus,
+  "/procedures": IconChecklist,
+  "/settings": IconSettings,
+};
 
-/** The rooms; the rest of the search, device and filter too, goes along. */
+/** The rooms; the device and the blade that one is about go along. */
 export function Navigation() {
   const t = useTexts();
   return (
     <nav className={classes.rooms} aria-label={t("page.rooms.label")}>
-      {ROOMS.map(({ to, key, Icon }) => (
-        <Link
-          key={to}
-          to={to}
-          search={(before: PageSearch) => readSearch({ ...before, edit: undefined })}
-          className={classes.room}
-          activeOptions={{ exact: true, includeSearch: false }}
-        >
-          <Icon size={22} aria-hidden />
-          {t(`page.rooms.${key}`)}
-        </Link>
-      ))}
+      {ROOMS.map(({ path, name }) => {
+        const RoomIcon = ICONS[path];
+        return (
+          <Link
+            key={path}
+            to={path}
+            search={roomSearch}
+            className={classes.room}
+            activeOptions={{ exact: true, includeSearch: false }}
+          >
+            <RoomIcon size={22} aria-hidden />
+            {t(`page.rooms.${name}`)}
+          </Link>
+        );
+      })}
     </nav>
   );
 }

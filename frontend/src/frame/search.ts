@@ -100,6 +100,31 @@ const TEXTS = [
   "frame",
 ] as const;
 
+/**
+ * What goes along from room to room: how the page looks, and which blade and device it is about. Everything else belongs
+ * to one room and would mean something else, or nothing, in another: a name filtered for in the parameters would hide
+ * the frames of the bus.
+ */
+const TRAVELS = [
+  "lang",
+  "theme",
+  "scene",
+  "camera",
+  "ghost",
+  "events",
+  "eventq",
+  "severity",
+  "drawer",
+  "device",
+  "blade",
+] as const satisfies readonly (keyof PageSearch)[];
+
+/** The search with which another room is opened; `own` is what is to be seen there. */
+export function roomSearch(before: PageSearch, own: PageSearch = {}): PageSearch {
+  const along = Object.fromEntries(TRAVELS.map((name) => [name, before[name]]));
+  return readSearch({ ...along, ...own });
+}
+
 /** Takes what is valid and leaves the rest: a damaged link opens the page all the same. */
 export function readSearch(raw: Record<string, unknown>): PageSearch {
   const search: PageSearch = {};
@@ -150,14 +175,14 @@ export function usePageSearch(): [PageSearch, (change: Change) => void] {
   return [search, update];
 }
 
-/** Goes to a section of the settings; what the URL holds of other rooms goes along. */
+/** Goes to a section of the settings. */
 export function useOpenSettings(): (section: string) => void {
   const navigate = useNavigate();
   return useCallback(
     (section: string) => {
       void navigate({
         to: "/settings",
-        search: (before: PageSearch) => readSearch({ ...before, section }),
+        search: (before: PageSearch) => roomSearch(before, { section }),
       });
     },
     [navigate],

@@ -1,5 +1,5 @@
 import { Link } from "@tanstack/react-router";
-import { type PageSearch, readSearch } from "../frame/search";
+import { type PageSearch, roomSearch } from "../frame/search";
 import type { DeviceContext } from "../model/shown";
 import { hexadecimal, isInteger } from "../model/values";
 import { type Translate, useTexts } from "../texts/texts";
@@ -27,7 +27,7 @@ export function ReadingText({ context, address, pace, instead, tone }: Props) {
   return (
     <Link
       to="/parameters"
-      search={(before: PageSearch) => readSearch({ ...before, ...parameterSearch(context.slug, address) })}
+      search={(before: PageSearch) => roomSearch(before, parameterSearch(context.slug, address))}
       className={`${classes.reading} ${tone === undefined ? "" : `tone-${tone}`}`}
       data-stale={reading.stale}
       data-testid={`reading-${address}`}

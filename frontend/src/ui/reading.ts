@@ -2,10 +2,11 @@
 import { useQuery } from "@tanstack/react-query";
 import { useMemo } from "react";
 import { descriptionQuery } from "../api/queries";
-import type { DescriptionDoc, DeviceRef, EntryDoc, Raw } from "../api/types";
+import type { DescriptionDoc, DeviceRef, EntryDoc, Language, Raw } from "../api/types";
 import { store, useCell, useHearing, useLink, useNodes, useServerNow } from "../live/live";
 import type { Cell } from "../live/store";
-import { type DeviceContext, shownOf } from "../model/shown";
+import { type DeviceContext, type Shown, shownOf } from "../model/shown";
+import { figure } from "../model/values";
 import { useTexts } from "../texts/texts";
 
 const REFRESH_MS = 1000;
@@ -57,6 +58,14 @@ export function useDeviceContext(device: DeviceRef | undefined): DeviceContext |
   }, [device, doc, t]);
 }
 
+const MILLI = 1000;
+
+/** A voltage in V where the device counts mV: 565.0 V is read faster than 564965 mV. The parameters show it as it is. */
+function atAGlance(shown: Shown, raw: Raw, language: Language): Shown {
+  if (shown.unit !== "mV" || typeof raw !== "number") return shown;
+  return { ...shown, text: figure(raw / MILLI, 1, language), unit: "V" };
+}
+
 export function readingOf(
   context: DeviceContext,
   address: string,
@@ -67,7 +76,7 @@ export function readingOf(
 ): Reading | null {
   const entry = entriesOf(context.doc).get(address);
   if (!entry || !cell?.known || cell.raw === null) return null;
-  const { text, unit, names } = shownOf(entry, cell.raw, context);
+  const { text, unit, names } = atAGlance(shownOf(entry, cell.raw, context), cell.raw, context.t.language);
   const ageMs = cell.t_ns === null ? Infinity : Math.max(0, nowMs - cell.t_ns / 1e6);
   const stale = cell.stale || silent || ageMs > FRESH_MS[pace];
   return { entry, raw: cell.raw, text, unit, names, stale, ageMs };

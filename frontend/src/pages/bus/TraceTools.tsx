@@ -20,6 +20,7 @@ import { useDeviceName } from "../../ui/devices";
 import { notify } from "../../ui/notices";
 import { csvOf, download, tsvOf } from "../parameters/export";
 import classes from "./Bus.module.css";
+import { Direction } from "./Direction";
 import { GROUPS, isFiltered, listOf, NO_FILTER } from "./filter";
 import { table } from "./lines";
 import type { useTrace } from "./useTrace";
@@ -53,6 +54,7 @@ export function TraceTools({ trace }: { trace: ReturnType<typeof useTrace> }) {
         onChoose={(chosen) => update({ services: chosen.join() || undefined })}
         testId="trace-services"
       />
+      <Direction />
       <Typed name="ids" label="ids" hint="ids_hint" width={130} />
       <Typed name="data" label="data" hint="data_hint" width={120} />
       <Tooltip label={t("trace.page.errors")}>

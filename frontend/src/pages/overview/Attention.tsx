@@ -10,7 +10,7 @@ import { Link } from "@tanstack/react-router";
 import { useState } from "react";
 import { descriptionQuery, turbineQuery } from "../../api/queries";
 import type { Turbine } from "../../api/types";
-import { type PageSearch, readSearch } from "../../frame/search";
+import { type PageSearch, roomSearch } from "../../frame/search";
 import { store, useAxes, useHearing, useLink, useNodes, useServerNow } from "../../live/live";
 import { type Translate, useTexts } from "../../texts/texts";
 import { placesOf } from "../../ui/devices";
@@ -93,12 +93,7 @@ function FindingLine({ finding }: { finding: Finding }) {
       <span className="visually-hidden">{t(`page.severity.${finding.tone}`)}</span>
       <span>{t(finding.key, finding.details)}</span>
       {device !== null && (
-        <Link
-          to="/parameters"
-          search={(before: PageSearch) =>
-            readSearch({ ...before, q: undefined, only: undefined, view: undefined, device, ...more })
-          }
-        >
+        <Link to="/parameters" search={(before: PageSearch) => roomSearch(before, { device, ...more })}>
           {t("page.rooms.parameters")} <IconArrowRight size={15} aria-hidden />
         </Link>
       )}

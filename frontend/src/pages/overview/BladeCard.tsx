@@ -2,7 +2,7 @@ import { IconAlertOctagon, IconAlertTriangle, IconArrowRight } from "@tabler/ico
 import { Link } from "@tanstack/react-router";
 import { lazy, Suspense } from "react";
 import type { AxisData, DeviceRef, StationRef } from "../../api/types";
-import { type PageSearch, readSearch } from "../../frame/search";
+import { type PageSearch, roomSearch } from "../../frame/search";
 import { followsDemand } from "../../live/axis";
 import { useAxes, useNodes, useServerNow, useWatchDevice } from "../../live/live";
 import { figure } from "../../model/values";
@@ -42,7 +42,7 @@ export function BladeCard({ station }: { station: StationRef }) {
         {name}
         <Link
           to="/axis"
-          search={(before: PageSearch) => readSearch({ ...before, blade: String(blade) })}
+          search={(before: PageSearch) => roomSearch(before, { blade: String(blade) })}
           className={classes.toAxis}
         >
           {t("page.rooms.axis")} <IconArrowRight size={15} aria-hidden />

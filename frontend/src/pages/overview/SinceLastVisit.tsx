@@ -2,7 +2,7 @@ import { IconAlertTriangle, IconHistory } from "@tabler/icons-react";
 import { useQuery } from "@tanstack/react-query";
 import { Link } from "@tanstack/react-router";
 import { type ChangedDevice, type SinceLastVisit as Changes, sinceLastVisitQuery } from "../../api/visits";
-import { type PageSearch, readSearch } from "../../frame/search";
+import { type PageSearch, roomSearch } from "../../frame/search";
 import { useBench, useLink } from "../../live/live";
 import { useTexts } from "../../texts/texts";
 import { useDeviceName } from "../../ui/devices";
@@ -79,12 +79,7 @@ function Device({ changed }: { changed: ChangedDevice }) {
             <Link
               to="/parameters"
               search={(before: PageSearch) =>
-                readSearch({
-                  ...before,
-                  only: undefined,
-                  view: undefined,
-                  ...parameterSearch(changed.device, row.address),
-                })
+                roomSearch(before, parameterSearch(changed.device, row.address))
               }
             >
               {row.address} {t.nameOf(row.name)}

@@ -3,7 +3,7 @@ import { useQueries, useQuery } from "@tanstack/react-query";
 import { Link } from "@tanstack/react-router";
 import { setsQuery } from "../../api/files";
 import { descriptionQuery, turbineQuery } from "../../api/queries";
-import { type PageSearch, readSearch, usePageSearch } from "../../frame/search";
+import { roomSearch, usePageSearch } from "../../frame/search";
 import { store, useHearing, useLink, useNodes, useServerNow, useWatchDevice } from "../../live/live";
 import { useTexts } from "../../texts/texts";
 import { placesOf } from "../../ui/devices";
@@ -123,7 +123,7 @@ function StepLine({ step, facts, tick, next }: { step: Step; facts: Facts; tick:
         <span className={classes.tick}>{t(`page.procedures.tick.${tick}`)}</span>
         <p>{t(`page.procedures.step.${step.key}.${tick === Tick.Done ? "done" : "todo"}`, details)}</p>
       </div>
-      <Link to={step.to} search={(before: PageSearch) => readSearch({ ...before })} className={classes.go}>
+      <Link to={step.to} search={roomSearch} className={classes.go}>
         {t(`page.rooms.${room}`)} <IconArrowRight size={15} aria-hidden />
       </Link>
     </li>
