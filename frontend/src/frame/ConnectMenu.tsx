@@ -7,13 +7,13 @@ import {
   IconPlugOff,
   IconSettings,
 } from "@tabler/icons-react";
-import { useMutation, useQuery } from "@tanstack/react-query";
+import { useQuery } from "@tanstack/react-query";
 import { lazy, Suspense, useState } from "react";
-import { queryClient, turbineQuery } from "../api/queries";
-import { connecting, knownTurbinesQuery } from "../api/settings";
+import { turbineQuery } from "../api/queries";
+import { knownTurbinesQuery } from "../api/settings";
 import { useTexts } from "../texts/texts";
-import { notify } from "../ui/notices";
 import { storyOf } from "../ui/problem";
+import { type Connecting, useConnecting } from "./connecting";
 import classes from "./Frame.module.css";
 import { useRole } from "./role";
 import { useOpenSettings } from "./search";
@@ -61,11 +61,8 @@ export function ConnectMenu() {
   );
 }
 
-interface ChoicesProps {
-  connect: (slug: string) => void;
-  disconnect: () => void;
+interface ChoicesProps extends Connecting {
   connected: boolean;
-  busy: boolean;
   onEnd: () => void;
 }
 
@@ -129,31 +126,4 @@ function Choices({ connect, disconnect, connected, busy, onEnd }: ChoicesProps) 
       </Menu.Item>
     </>
   );
-}
-
-function useConnecting(): Omit<ChoicesProps, "connected" | "onEnd"> {
-  const t = useTexts();
-  const failed = (title: string) => (error: unknown) => {
-    const story = storyOf(error, t);
-    notify({ tone: "error", title, lines: [story.happened, story.next] });
-  };
-  const settle = async () => {
-    await queryClient.invalidateQueries({ queryKey: turbineQuery.queryKey });
-    await queryClient.invalidateQueries({ queryKey: knownTurbinesQuery.queryKey });
-  };
-  const connect = useMutation({
-    mutationFn: connecting.connect,
-    onError: failed(t("page.connect.failed")),
-    onSettled: settle,
-  });
-  const disconnect = useMutation({
-    mutationFn: connecting.disconnect,
-    onError: failed(t("page.connect.disconnect_failed")),
-    onSettled: settle,
-  });
-  return {
-    connect: connect.mutate,
-    disconnect: () => disconnect.mutate(),
-    busy: connect.isPending || disconnect.isPending,
-  };
 }

@@ -59,7 +59,7 @@ function ModeBadge({ mode, connected }: { mode: Mode; connected: boolean }) {
 function BusFacts({ link }: { link: LinkData | null }) {
   const t = useTexts();
   const history = useLoadHistory();
-  if (!link) return null;
+  if (!link || link.state === "disconnected") return null;
   const connected = link.state === "connected";
   const load = t("page.bus.load", { load: figure(link.load * 100, 0, t.language).padStart(2, " ") });
   return (
@@ -86,7 +86,7 @@ function RecordingLight({ link }: { link: LinkData | null }) {
   const t = useTexts();
   const nowMs = useServerNow(SECOND_MS);
   const recording = link?.recording;
-  if (!recording) return null;
+  if (!recording || link.state === "disconnected") return null;
   const on = recording.state === "on";
   const ranMs = recording.since_ns === null ? 0 : nowMs - recording.since_ns / 1e6;
   const losing = recording.lost > 0;

@@ -3,6 +3,7 @@ import { useQuery } from "@tanstack/react-query";
 import { turbineQuery } from "../../api/queries";
 import type { AxisData, StationRef } from "../../api/types";
 import { usePageSearch } from "../../frame/search";
+import { Unconnected } from "../../frame/Unconnected";
 import { useAxes, useServerNow, useWatchDevice } from "../../live/live";
 import { figure } from "../../model/values";
 import { useTexts } from "../../texts/texts";
@@ -21,10 +22,12 @@ import { StateDiagram } from "./StateDiagram";
 /** One axis in full: its state machine, what it measures, its inputs and outputs. Nothing here moves anything. */
 export function AxisPage() {
   const t = useTexts();
-  const turbine = useQuery(turbineQuery).data;
+  const query = useQuery(turbineQuery);
+  const turbine = query.data;
   const [search, update] = usePageSearch();
   const stations = (turbine?.stations ?? []).filter((station) => station.blade !== null);
   const station = stations.find((one) => String(one.blade) === search.blade) ?? stations[0];
+  if (!turbine) return query.isSuccess ? <Unconnected /> : null;
   if (!station) return <p className={room.note}>{t("page.axis.none")}</p>;
   return (
     <div className={classes.page}>

@@ -1,5 +1,6 @@
 import { Tabs } from "@mantine/core";
 import { usePageSearch } from "../../frame/search";
+import { Unconnected } from "../../frame/Unconnected";
 import { useBench } from "../../live/live";
 import { useTexts } from "../../texts/texts";
 import classes from "./Bus.module.css";
@@ -44,14 +45,7 @@ export function BusPage() {
           ))}
         </Tabs.List>
       </Tabs>
-      {bench?.turbine === null ? (
-        <div className={classes.nothing}>
-          <strong>{t("trace.page.disconnected")}</strong>
-          <p>{t("trace.page.disconnected_next")}</p>
-        </div>
-      ) : (
-        <View />
-      )}
+      {bench !== null && (bench.turbine === null ? <Unconnected /> : <View />)}
     </div>
   );
 }

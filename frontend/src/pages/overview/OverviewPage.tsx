@@ -1,5 +1,6 @@
 import { useQuery } from "@tanstack/react-query";
 import { turbineQuery } from "../../api/queries";
+import { Unconnected } from "../../frame/Unconnected";
 import { Attention } from "./Attention";
 import { BladeCard } from "./BladeCard";
 import { SinceLastVisit } from "./SinceLastVisit";
@@ -7,7 +8,8 @@ import classes from "./Overview.module.css";
 
 /** Three blades at one look, and above them what needs a look. */
 export function OverviewPage() {
-  const turbine = useQuery(turbineQuery).data;
+  const query = useQuery(turbineQuery);
+  const turbine = query.data;
   const blades = (turbine?.stations ?? []).filter((station) => station.blade !== null);
   return (
     <div className={classes.page}>
@@ -20,6 +22,7 @@ export function OverviewPage() {
           <BladeCard key={station.slug} station={station} />
         ))}
       </div>
+      {query.isSuccess && !turbine && <Unconnected />}
     </div>
   );
 }

@@ -4,6 +4,7 @@ import { useEffect, useMemo } from "react";
 import { descriptionQuery, sessionQuery, turbineQuery } from "../../api/queries";
 import type { DescriptionDoc } from "../../api/types";
 import { usePageSearch } from "../../frame/search";
+import { Unconnected } from "../../frame/Unconnected";
 import { useWatchDevice } from "../../live/live";
 import { useTexts } from "../../texts/texts";
 import { placesOf, type Place, stationName } from "../../ui/devices";
@@ -54,7 +55,8 @@ export function ParametersPage() {
       )}
       {error && <ProblemAlert error={error} title={t("page.table.not_loaded")} />}
       {selection && description.data && <Room places={places} selection={selection} doc={description.data} />}
-      {!error && !description.data && (
+      {turbine.isSuccess && !turbine.data && <Unconnected />}
+      {!error && turbine.data !== undefined && !description.data && (
         <Center h="60%">
           <Loader aria-label={t("page.loading")} />
         </Center>
