@@ -47,13 +47,21 @@ class Shot:
 SHOTS: Final = (
     Shot("overview", "/", "[data-testid=blade-3] [data-testid=angle]:has-text('°')", scene=True),
     Shot("overview-de", "/", "[data-testid=blade-3] [data-testid=angle]:has-text('°')", "de", True, ("dark",)),
-    Shot("axis", "/axis?blade=1", "main", scene=True),
+    Shot("axis", "/axis?blade=1", "[data-testid=axis-angle]:has-text('°')", scene=True),
     Shot("parameters", "/parameters?device=wtg-07/blade-1/pmm", "main [data-testid^='value-']"),
-    Shot("sets", "/sets", "main"),
-    Shot("recordings", "/recordings", "main"),
-    Shot("bus", "/bus", "main"),
-    Shot("procedures", "/procedures", "main"),
-    Shot("settings", "/settings", "main"),
+    Shot(
+        "parameters-side",
+        "/parameters?device=wtg-07/blade-1/pmm&view=side&q=3110&edit=3110:01",
+        "main [data-testid$='blade-3/pmm-3110:01']:has-text('50.0')",
+    ),
+    Shot("sets", "/sets", "main [role=row]:has-text('yearly service')"),
+    Shot("recordings", "/recordings", "main [role=row] >> nth=1"),
+    Shot("bus", "/bus", "[data-testid=trace-row] >> nth=20"),
+    Shot("bus-nodes", "/bus?tab=nodes", "main :text('Blade 3 PMC')"),
+    Shot("procedures", "/procedures", "main h2"),
+    Shot("settings", "/settings", "[data-testid=adapters]"),
+    Shot("settings-polling", "/settings?section=polling", "[data-testid=save-polling]"),
+    Shot("settings-audit", "/settings?section=audit", "[data-testid=audit-rows]"),
 )
 
 
