@@ -44,6 +44,11 @@ class Kind(Enum):
             return Severity.ERROR
         return Severity.WARNING if self in _WARNINGS else Severity.INFO
 
+    @property
+    def has_doer(self) -> bool:
+        """True for what a person did; false for what became of bus, recording and store meanwhile."""
+        return self in _DONE
+
 
 _WARNINGS: Final = (
     Kind.OTHER_MASTER,
@@ -52,6 +57,18 @@ _WARNINGS: Final = (
     Kind.STOP_SENT,
     Kind.FEATHER_SENT,
     Kind.FOREIGN_WRITTEN,
+)
+_DONE: Final = (
+    Kind.CONNECTED,
+    Kind.DISCONNECTED,
+    Kind.CONSENT,
+    Kind.WRITTEN,
+    Kind.WRITE_FAILED,
+    Kind.SAVED,
+    Kind.RESTART,
+    Kind.STOP_SENT,
+    Kind.FEATHER_SENT,
+    Kind.SETTINGS_CHANGED,
 )
 
 

@@ -157,13 +157,17 @@ class ValueCell:
 
 @dataclass(frozen=True, slots=True)
 class EventLine:
-    """One event; ``details`` fill the placeholders of the text, those that end in ``_key`` are text keys."""
+    """One event; ``details`` fill the placeholders of the text, those that end in ``_key`` are text keys.
+
+    ``person`` is who did it, None where nobody here did.
+    """
 
     t_ns: int
     severity: SeverityName
     device: str | None
     text_key: str
     details: Mapping[str, Any]
+    person: str | None = None
 
 
 # -- nodes -------------------------------------------------------------------------
@@ -405,4 +409,5 @@ def event_of_journal(entry: JournalEntry) -> EventLine:
     details = {
         name: detail if isinstance(detail, int | float) else str(detail) for name, detail in entry.details.items()
     }
-    return EventLine(entry.t_ns, entry.kind.severity.value, entry.device, entry.text_key, details)
+    person = entry.person if entry.kind.has_doer else None
+    return EventLine(entry.t_ns, entry.kind.severity.value, entry.device, entry.text_key, details, person)

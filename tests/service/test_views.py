@@ -12,6 +12,7 @@ from app.model.datatypes import DataType, encode_raw
 from app.scene.hub import BladeState
 from app.service import views
 from app.service.connection import Connection
+from app.service.journal import Journal, Kind
 from app.service.scene_feed import pose
 from app.wire import sdo
 from app.wire.events import EventKind
@@ -197,6 +198,14 @@ def test_events_name_the_device_by_its_slug(bench: Connection, feeder: Feeder) -
     slugs = {(target.device.bus, target.node): target.slug for target in bench.targets}
     lines = [views.event_of_wire(event, slugs) for event in bench.live.events()]
     assert [(line.device, line.details.get("node")) for line in lines] == [(PMC, None), (None, 77)]
+
+
+def test_what_a_person_did_bears_the_name_and_what_became_of_the_bus_bears_none() -> None:
+    journal = Journal(lambda: 1, "Anna")
+    journal.note(Kind.WRITTEN, "wtg-07/blade-1/pmm", address="3110:01")
+    journal.by("Ben").note(Kind.STOP_SENT, None, count=3)
+    journal.note(Kind.BUS_LOST, None, bus="can0")
+    assert [views.event_of_journal(entry).person for entry in journal.latest()] == ["Anna", "Ben", None]
 
 
 def test_the_3d_view_shows_what_is_known_and_how_well(bench: Connection, feeder: Feeder) -> None:

@@ -1692,6 +1692,8 @@ export interface components {
         /**
          * EventLine
          * @description One event; ``details`` fill the placeholders of the text, those that end in ``_key`` are text keys.
+         *
+         *     ``person`` is who did it, None where nobody here did.
          */
         EventLine: {
             /** Details */
@@ -1700,6 +1702,11 @@ export interface components {
             };
             /** Device */
             device: string | null;
+            /**
+             * Person
+             * @default null
+             */
+            person: string | null;
             /**
              * Severity
              * @enum {string}

@@ -26,7 +26,11 @@ const SEVERITY_TONES = { info: "dim", warning: "tone-warning", error: "tone-erro
 const LEAST = ["info", "warning", "error"] as const;
 const TALL = "tall";
 
-const textOf = (event: EventData, t: Translate) => t(event.text_key, event.details);
+/** What happened, and who did it where somebody here did. */
+function textOf({ text_key, details, person }: EventData, t: Translate): string {
+  const text = t(text_key, details);
+  return person === null ? text : t("page.events.by", { text, person });
+}
 
 /** What happened, newest first; closed it still shows the newest. */
 export function EventDrawer() {

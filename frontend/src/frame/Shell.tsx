@@ -43,10 +43,11 @@ function Gate({ wanted }: { wanted: Language | undefined }) {
   useEffect(() => {
     document.documentElement.lang = language;
   }, [language]);
-  const epoch = useBench()?.epoch;
+  const bench = useBench();
+  const connection = bench && `${bench.epoch} ${bench.turbine ?? ""}`;
   useEffect(() => {
     void queryClient.invalidateQueries({ queryKey: turbineQuery.queryKey });
-  }, [epoch]);
+  }, [connection]);
   useEffect(() => {
     if (session.isSuccess) startLive();
   }, [session.isSuccess]);

@@ -105,6 +105,18 @@ describe("store", () => {
     expect(store.cell(PMC, "6067")).toBeUndefined();
   });
 
+  it("forgets what it knew of another turbine, also where a new server counts as the one before", () => {
+    const bench = (turbine: string) => ({ epoch: 1, turbine, visit: null });
+    send("bench", bench("wtg-07"));
+    send("axes", [axis(80)]);
+    send("values", { device: PMC, full: true, values: { "6065": value("0A") } });
+    send("bench", bench("wtg-07"));
+    expect(store.cell(PMC, "6065")?.hex).toBe("0A");
+    send("bench", bench("wtg-08"));
+    expect(store.axes.size).toBe(0);
+    expect(store.cell(PMC, "6065")).toBeUndefined();
+  });
+
   it("marks a change of a known value, and neither the first reading nor a re-reading", () => {
     send("values", { device: PMC, full: false, values: { "6065": value("0A") } });
     expect(store.cell(PMC, "6065")?.changedAtMs).toBeNull();
@@ -130,6 +142,7 @@ describe("store", () => {
       device: null,
       text_key: "k",
       details: {},
+      person: null,
     });
     for (const tNs of [1, 3, 2, 3, 1]) send("event", event(tNs));
     expect(store.events.map((one) => one.t_ns)).toEqual([3, 2, 1]);

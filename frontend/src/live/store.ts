@@ -128,7 +128,9 @@ export class LiveStore {
 
   /** Another connection: whatever was known of the one before is void. */
   private applyBench(bench: BenchData): void {
-    const another = this.bench !== null && this.bench.epoch !== bench.epoch;
+    // A server that was started anew counts its connections anew: the turbine may be another one all the same.
+    const before = this.bench;
+    const another = before !== null && (before.epoch !== bench.epoch || before.turbine !== bench.turbine);
     this.bench = bench;
     this.mark("bench");
     if (!another) return;
