@@ -14,7 +14,7 @@ from typing import Final
 from app.cli.output import Output
 from app.cli.users import opened
 from app.errors import UsageError
-from app.service.audit import AuditLog, text_key_of
+from app.service.office.audit import AuditLog, text_key_of
 from app.store.audit_chain import AuditRow, Head
 from app.store.audit_rows import Filter, details_of
 

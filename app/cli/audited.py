@@ -19,7 +19,7 @@ async def audited(arguments: argparse.Namespace, output: Output, journal: Journa
     another master.
     """
     # Late: most commands on a bus change nothing, and need not wait for the store's libraries.
-    from app.service.audit import AuditLog
+    from app.service.office.audit import AuditLog
     from app.store.store import Store
 
     try:

@@ -13,8 +13,8 @@ from typing import Final
 from app.cli.output import Output
 from app.errors import UsageError
 from app.model.roles import Role
-from app.service.audit import AuditLog
-from app.service.users import Users
+from app.service.office.audit import AuditLog
+from app.service.office.users import Users
 from app.store.store import Store
 from app.store.user_rows import User
 

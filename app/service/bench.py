@@ -16,7 +16,7 @@ from app.service.bitrates import with_bitrates
 from app.service.connection import Connection
 from app.service.journal import Journal, Kind
 from app.service.link import TwinWatch
-from app.service.office import Office
+from app.service.office.office import Office
 from app.service.options import Options
 from app.service.poll import Poller
 from app.service.polling import Polling

@@ -12,9 +12,9 @@ from app.drivers.table import driver_class
 from app.model.address import Address
 from app.model.description import Bus, Description
 from app.model.site import BusConfig
-from app.service.foreign_writes import ForeignWrites
+from app.service.office.foreign_writes import ForeignWrites
 from app.service.options import Options
-from app.service.trace_log import BusTrace
+from app.service.trace.log import BusTrace
 from app.wire.busload import EXTENDED_KEY, BusLoad, LoadSecond
 from app.wire.can_bits import frame_bits
 from app.wire.decoder import CanOpenDecoder

@@ -16,8 +16,8 @@ from app.recording.content import RecorderClock
 from app.recording.writer import RecorderStatus
 from app.service.bus_link import BusLink
 from app.service.devices import Target
-from app.service.foreign_writes import ForeignWrites
 from app.service.journal import Journal, Kind
+from app.service.office.foreign_writes import ForeignWrites
 from app.service.options import Options
 from app.service.recording import Recording, Subject
 from app.service.stop import CONTROLWORD, Axis, is_axis

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from app.model.roles import SignedIn
-from app.service.sessions import SESSION_S, Session, Sessions
+from app.service.office.sessions import SESSION_S, Session, Sessions
 
 
 class Access:

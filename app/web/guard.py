@@ -22,7 +22,7 @@ from typing import Any, Final
 from urllib.parse import parse_qs
 
 from app.errors import HubsideError, LoginNeededError
-from app.service.sessions import Session
+from app.service.office.sessions import Session
 from app.web.access import Access
 from app.web.problem import (
     MEDIA_TYPE,

@@ -23,9 +23,9 @@ from app.service.devices import Target
 from app.service.journal import Entry
 from app.service.link import LinkLine, bench_line, link_urgent
 from app.service.rotor_view import NOBODY, rotor_line
-from app.service.trace_query import TraceQuery
-from app.service.trace_tail import PERIOD_S as TRACE_S
-from app.service.trace_tail import TraceTail
+from app.service.trace.query import TraceQuery
+from app.service.trace.tail import PERIOD_S as TRACE_S
+from app.service.trace.tail import TraceTail
 from app.service.views import (
     AxisLine,
     EventLine,

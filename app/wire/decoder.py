@@ -39,7 +39,7 @@ from app.wire.records import (
     ValueSeen,
 )
 from app.wire.sdo_follower import SdoFollower
-from app.wire.trace_service import UNKNOWN, Service, Speaker, predefined
+from app.wire.trace.service import UNKNOWN, Service, Speaker, predefined
 
 ERROR_REGISTER: Final = Address(0x1001)
 _EXTENDED: Final = 1 << 29

@@ -159,6 +159,47 @@ def test_the_tables_say_who_is_there_and_how_loaded_the_bus_is(page: Page, demo:
     expect(page.get_by_test_id("load-nodes")).to_contain_text("Blade 1 PMC")
 
 
+def test_a_table_is_filtered_sorted_cut_and_copied(page: Page, demo: tuple[str, BrowserContext]) -> None:
+    page.context.grant_permissions(["clipboard-read", "clipboard-write"])
+    page.goto(f"{demo[0]}&tab=ids")
+    expect(page.get_by_test_id("ids-can0-70D")).to_be_visible()
+    table = page.get_by_test_id("table-ids")
+    rows = table.locator("[data-testid^='ids-can0-']")
+    page.get_by_test_id("find").fill("heartbeat pmc")
+    expect(rows).to_have_count(3)
+    page.get_by_test_id("sort-id").click()
+    expect(rows.first).to_contain_text("70B")
+    page.get_by_test_id("sort-id").click()
+    expect(rows.first).to_contain_text("70D")
+    expect(table.get_by_role("columnheader", name="ID")).to_have_attribute("aria-sort", "descending")
+    page.get_by_test_id("files-menu").click()
+    page.get_by_test_id("column-range").click()
+    expect(table.get_by_role("columnheader", name="Shortest")).to_have_count(0)
+    page.get_by_test_id("table-copy").click()
+    copied = [line.split("\t") for line in page.evaluate("navigator.clipboard.readText()").splitlines()]
+    assert [line[0] for line in copied] == ["ID", "70D", "70C", "70B"]
+    assert "Frames" in copied[0] and "Shortest – longest" not in copied[0]
+    expect(page).to_have_url(re.compile(r"find=heartbeat.pmc&order=-id&less=range"))
+    page.reload()
+    expect(rows).to_have_count(3)
+    expect(rows.first).to_contain_text("70D")
+
+
+def test_a_live_table_keeps_the_focus_and_stands_still_under_it(page: Page, demo: tuple[str, BrowserContext]) -> None:
+    page.goto(f"{demo[0]}&tab=ids&order=last")
+    rows = page.get_by_test_id("table-ids").locator("[data-testid^='ids-can0-']")
+    expect(rows.nth(5)).to_be_visible()
+    page.get_by_test_id("find").press("ArrowDown")
+    page.keyboard.press("ArrowDown")
+    focused = page.get_by_test_id("table-ids").locator("[data-testid^='ids-can0-']:focus")
+    expect(focused).to_have_count(1)
+    order = rows.evaluate_all("(all) => all.map((row) => row.dataset.testid)")
+    at, counted = focused.get_attribute("data-testid"), focused.locator("[data-column=count]").inner_text()
+    expect(focused.locator("[data-column=count]")).not_to_have_text(counted)
+    assert focused.get_attribute("data-testid") == at
+    assert rows.evaluate_all("(all) => all.map((row) => row.dataset.testid)") == order
+
+
 def test_the_rows_go_along_as_a_file(page: Page, demo: tuple[str, BrowserContext]) -> None:
     page.goto(f"{demo[0]}&services=sdo&q=6041")
     expect(page.get_by_test_id("trace-row").nth(3)).to_be_visible()

@@ -11,12 +11,12 @@ import pytest
 from app.errors import RefusedError
 from app.model.address import Address
 from app.model.texts import load_texts
-from app.service import trace_tables
 from app.service.connection import Connection
-from app.service.trace_pages import Side, TracePages
-from app.service.trace_query import TraceQuery
-from app.service.trace_tail import MAX_ROWS, MAX_WAITING, TraceTail
-from app.service.trace_text import TraceLine
+from app.service.trace import tables
+from app.service.trace.pages import Side, TracePages
+from app.service.trace.query import TraceQuery
+from app.service.trace.tail import MAX_ROWS, MAX_WAITING, TraceTail
+from app.service.trace.text import TraceLine
 from app.service.write import write_raw
 from app.wire import sdo
 from app.wire.emcy import emcy
@@ -250,19 +250,19 @@ async def test_the_tables_of_a_real_bus(connection: Connection, served: Served) 
     await write_raw(connection.driver(target), target, address, 490, connection.journal)
     with pytest.raises(RefusedError):
         await write_raw(connection.driver(target), target, Address(0x3000), 1, connection.journal)
-    await until(lambda: all(node.heartbeat_t_ns is not None for node in trace_tables.nodes(connection)))
-    nodes = {node.node: node for node in trace_tables.nodes(connection)}
+    await until(lambda: all(node.heartbeat_t_ns is not None for node in tables.nodes(connection)))
+    nodes = {node.node: node for node in tables.nodes(connection)}
     assert sorted(nodes) == [1, 2, 3, 11, 12, 13]
     assert nodes[2].device == "wtg-07/blade-2/pmm" and nodes[2].nmt == "nmt.state.pre_operational"
     assert nodes[2].sdo_count >= 3
 
-    transfers = trace_tables.transfers(connection, "writes", 2, 10)
+    transfers = tables.transfers(connection, "writes", 2, 10)
     assert [(one.access, one.item.address, one.item.text, one.outcome, one.ours) for one in transfers] == [
         ("write", "3110:01", "49.0", "done", True)
     ]
-    assert len(trace_tables.transfers(connection, "all", 2, 100)) == nodes[2].sdo_count
+    assert len(tables.transfers(connection, "all", 2, 100)) == nodes[2].sdo_count
 
-    identifiers = {one.can_id: one for one in trace_tables.identifiers(connection)}
+    identifiers = {one.can_id: one for one in tables.identifiers(connection)}
     assert identifiers[0x602].service == "sdo-request" and identifiers[0x602].direction == "tx"
     assert identifiers[0x702].node == 2 and identifiers[0x702].frames >= 1
 
@@ -289,10 +289,10 @@ def test_emergencies_and_foreign_nodes_are_listed() -> None:
     feed = Feed(connection)
     feed.can(0x80 + 77, emcy(0x2310, 3, b"\1"))
     feed.can(0x80 + 77, emcy(0, 0))
-    lines = trace_tables.emergencies(connection, 10)
+    lines = tables.emergencies(connection, 10)
     assert [(one.node, one.reset, one.details["code_hex"], one.device) for one in lines] == [
         (77, True, "0000h", None),
         (77, False, "2310h", None),
     ]
-    foreign = next(node for node in trace_tables.nodes(connection) if node.node == 77)
+    foreign = next(node for node in tables.nodes(connection) if node.node == 77)
     assert foreign.seen and foreign.device is None and foreign.emcy is not None and foreign.emcy["reset"] is True

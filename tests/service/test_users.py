@@ -17,10 +17,10 @@ from app.errors import (
     UserUnknownError,
 )
 from app.model.roles import Role, SignedIn
-from app.service.audit import AuditLog
-from app.service.login_pause import FORGET_S, FREE, KEPT, LONGEST_S, LoginPause
-from app.service.sessions import SESSION_S, Sessions
-from app.service.users import Users
+from app.service.office.audit import AuditLog
+from app.service.office.login_pause import FORGET_S, FREE, KEPT, LONGEST_S, LoginPause
+from app.service.office.sessions import SESSION_S, Sessions
+from app.service.office.users import Users
 from app.store import user_rows
 from app.store.audit_rows import Filter
 from app.store.store import Store

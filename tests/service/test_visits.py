@@ -15,13 +15,13 @@ from app.model.description_file import load_builtin
 from app.model.site import Turbine, load_site
 from app.service.bench import Bench
 from app.service.connection import Connection
-from app.service.foreign_writes import FIRST_WINDOW_NS, ForeignWrites
 from app.service.journal import Journal, Kind
-from app.service.last_change import Writer, history, last_changes
+from app.service.office.foreign_writes import FIRST_WINDOW_NS, ForeignWrites
+from app.service.office.last_change import Writer, history, last_changes
+from app.service.office.visit_changes import Progress, Time, VisitChanges, changes_since_last_visit
+from app.service.office.visits import GOES_ON_NS, Visits
 from app.service.options import Options
 from app.service.sites import Sites
-from app.service.visit_changes import Progress, Time, VisitChanges, changes_since_last_visit
-from app.service.visits import GOES_ON_NS, Visits
 from app.service.write import write_raw
 from app.store.store import Store
 from app.store.visit_rows import Phase

@@ -18,7 +18,7 @@ from sqlalchemy import Connection, text
 
 from app.errors import StoreBusyError, StoreDamagedError, StoreError, StoreInUseError
 from app.model.roles import Role
-from app.service.audit import Action, AuditLog
+from app.service.office.audit import Action, AuditLog
 from app.store import database, user_rows
 from app.store.migrations import SCHEMA, STEPS
 from app.store.schema import metadata

@@ -6,7 +6,7 @@ import asyncio
 import sys
 from pathlib import Path
 
-from app.service.audit import Action, AuditLog
+from app.service.office.audit import Action, AuditLog
 from app.store.store import Store
 
 

@@ -16,11 +16,11 @@ from app.wire.emcy import emcy
 from app.wire.frame import Can, Direction, Frame
 from app.wire.nmt import NmtCommand, NmtState, heartbeat, nmt_message
 from app.wire.records import ValueSeen
-from app.wire.trace import Gap, Item, Step, Tone, Tracer, TraceRow
-from app.wire.trace_filter import TraceFilter, parse_data, parse_ids
-from app.wire.trace_ids import Identifiers
-from app.wire.trace_ring import FrameRing
-from app.wire.trace_service import Service, Speaker, predefined
+from app.wire.trace.filter import TraceFilter, parse_data, parse_ids
+from app.wire.trace.ids import Identifiers
+from app.wire.trace.ring import FrameRing
+from app.wire.trace.service import Service, Speaker, predefined
+from app.wire.trace.tracer import Gap, Item, Step, Tone, Tracer, TraceRow
 from tests.wire import traffic
 from tests.wire.traffic import BUS, frame
 

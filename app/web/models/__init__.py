@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field, StrictFloat, StrictInt, Stric
 
 from app.service.link import LinkLine, Mode
 from app.service.rotor_view import RotorLine
-from app.service.trace_tail import TraceBatch
+from app.service.trace.tail import TraceBatch
 from app.service.views import AxisLine, EventLine, NodeLine, RawJson, ValueCell
 from app.web.models.trace import TraceFilter
 

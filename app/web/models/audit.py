@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel
 
-from app.service.audit import Verified, text_key_of
+from app.service.office.audit import Verified, text_key_of
 from app.store.audit_chain import AuditRow
 from app.store.audit_rows import details_of
 

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from app.service.trace_query import TraceQuery
+from app.service.trace.query import TraceQuery
 
 Words = Annotated[str, Field(max_length=200)]
 

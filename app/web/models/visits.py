@@ -6,9 +6,9 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from app.service.last_change import Change
+from app.service.office.last_change import Change
+from app.service.office.visit_changes import DeviceChanges, VisitChanges
 from app.service.views import RawJson, raw_to_json
-from app.service.visit_changes import DeviceChanges, VisitChanges
 from app.store.visit_rows import Visit
 
 Remark = Annotated[str, Field(max_length=2_000)]

@@ -11,9 +11,9 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Query
 
 from app.errors import UsageError
-from app.service import trace_tables
-from app.service.trace_pages import Side, TracePage, TracePages
-from app.service.trace_tables import BusIdentifier, BusLoadLine, BusNode, EmcyLine, SdoLine, Transfers
+from app.service.trace import tables
+from app.service.trace.pages import Side, TracePage, TracePages
+from app.service.trace.tables import BusIdentifier, BusLoadLine, BusNode, EmcyLine, SdoLine, Transfers
 from app.web.deps import ConnectionOf
 from app.web.models.trace import TraceFilter, Words, exact_ns
 
@@ -78,13 +78,13 @@ def _numbers(text: str) -> list[int]:
 @router.get("/live/bus/nodes")
 async def bus_nodes(connection: ConnectionOf) -> list[BusNode]:
     """All nodes that were seen on the buses, and those that the site names."""
-    return trace_tables.nodes(connection)
+    return tables.nodes(connection)
 
 
 @router.get("/live/bus/identifiers")
 async def bus_identifiers(connection: ConnectionOf) -> list[BusIdentifier]:
     """All CAN identifiers that were seen: latest data, count, rate, period, share of the load."""
-    return trace_tables.identifiers(connection)
+    return tables.identifiers(connection)
 
 
 @router.get("/live/bus/transfers")
@@ -95,16 +95,16 @@ async def bus_transfers(
     limit: Limit = 500,
 ) -> list[SdoLine]:
     """SDO transfers, newest first: all, only writes and what did not succeed, or only what did not succeed."""
-    return trace_tables.transfers(connection, which, node, limit)
+    return tables.transfers(connection, which, node, limit)
 
 
 @router.get("/live/bus/emergencies")
 async def bus_emergencies(connection: ConnectionOf, limit: Limit = 500) -> list[EmcyLine]:
     """Emergency messages, newest first."""
-    return trace_tables.emergencies(connection, limit)
+    return tables.emergencies(connection, limit)
 
 
 @router.get("/live/bus/load")
 async def bus_load(connection: ConnectionOf) -> list[BusLoadLine]:
     """Load of each bus now and second by second, with the share of each node."""
-    return trace_tables.load(connection)
+    return tables.load(connection)

@@ -6,7 +6,7 @@ from fastapi import APIRouter, Depends, Request, Response
 
 from app.errors import LoginNeededError, RoleError
 from app.model.roles import Role
-from app.service.sessions import Session
+from app.service.office.sessions import Session
 from app.web.access import Access
 from app.web.deps import BenchOf, PersonOf, needs
 from app.web.guard import SESSION

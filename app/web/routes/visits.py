@@ -8,8 +8,8 @@ from fastapi import APIRouter, Query
 
 from app.model.address import parse_address
 from app.model.roles import Role
-from app.service.last_change import history, last_changes
-from app.service.visit_changes import changes_since_last_visit
+from app.service.office.last_change import history, last_changes
+from app.service.office.visit_changes import changes_since_last_visit
 from app.store import small_rows
 from app.web.deps import DEVICE, BenchOf, ConnectionOf, PersonOf, TargetOf, needs
 from app.web.models.visits import (

@@ -25,7 +25,7 @@ from app.wire.records import (
     Record,
     SdoSeen,
 )
-from app.wire.trace_service import Service, Speaker
+from app.wire.trace.service import Service, Speaker
 
 _SDO: Final = (Service.SDO_REQUEST, Service.SDO_RESPONSE)
 GAP_SPEAKER: Final = Speaker(Service.GAP)

@@ -9,7 +9,7 @@ from typing import Any, Final, Literal
 from app.model.address import Address
 from app.service.bus_link import BusLink
 from app.service.connection import Connection
-from app.service.trace_text import Namer, TraceItem, abort_details, emcy_details
+from app.service.trace.text import Namer, TraceItem, abort_details, emcy_details
 from app.wire.busload import EXTENDED_KEY
 from app.wire.emcy import NO_ERROR
 from app.wire.frame import Can, Direction

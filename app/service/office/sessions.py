@@ -19,9 +19,9 @@ from typing import Final
 
 from app.errors import LoginError
 from app.model.roles import Role, SignedIn
-from app.service.audit import Action, AuditLog
-from app.service.login_pause import LoginPause
-from app.service.users import Users
+from app.service.office.audit import Action, AuditLog
+from app.service.office.login_pause import LoginPause
+from app.service.office.users import Users
 from app.store import user_rows
 from app.store.store import Store
 from app.store.user_rows import SessionRow, name_key

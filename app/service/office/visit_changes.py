@@ -12,10 +12,10 @@ from app.model.datatypes import Raw
 from app.model.description import Entry, RestoreClass
 from app.model.sets import ParameterSet
 from app.model.values import show
-from app.service.audit import AuditLog
 from app.service.devices import Target, decode
-from app.service.last_change import WRITES
-from app.service.visits import Visits
+from app.service.office.audit import AuditLog
+from app.service.office.last_change import WRITES
+from app.service.office.visits import Visits
 from app.store.audit_chain import AuditRow
 from app.store.audit_rows import Filter, details_of
 from app.store.visit_rows import Phase, Visit

@@ -14,10 +14,10 @@ from app.model.description import Description
 from app.wire.decoder import CanOpenDecoder
 from app.wire.frame import Frame
 from app.wire.records import EmcySeen, Outcome, Record, SdoAccess, SdoSeen
-from app.wire.trace import Gap, Item, Tracer
-from app.wire.trace_ids import Identifiers, IdentifierView
-from app.wire.trace_ring import Chunk, FrameRing
-from app.wire.trace_service import Speaker
+from app.wire.trace.ids import Identifiers, IdentifierView
+from app.wire.trace.ring import Chunk, FrameRing
+from app.wire.trace.service import Speaker
+from app.wire.trace.tracer import Gap, Item, Tracer
 
 MAX_TRANSFERS: Final = 5000
 MAX_EMERGENCIES: Final = 2000

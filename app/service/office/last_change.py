@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Final
 
-from app.service.audit import AuditLog
 from app.service.journal import Kind
+from app.service.office.audit import AuditLog
 from app.store.audit_chain import AuditRow
 from app.store.audit_rows import Filter, details_of
 

@@ -8,11 +8,11 @@ from typing import Final
 
 from app.errors import UsageError
 from app.service.connection import Connection
-from app.service.trace_log import BusTrace
-from app.service.trace_query import TraceQuery, filter_of
-from app.service.trace_text import Namer, TraceLine, line
-from app.wire.trace import Tone, Tracer, TraceRow
-from app.wire.trace_filter import TraceFilter
+from app.service.trace.log import BusTrace
+from app.service.trace.query import TraceQuery, filter_of
+from app.service.trace.text import Namer, TraceLine, line
+from app.wire.trace.filter import TraceFilter
+from app.wire.trace.tracer import Tone, Tracer, TraceRow
 
 PERIOD_S: Final = 0.1
 MAX_ROWS: Final = 100

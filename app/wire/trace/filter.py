@@ -10,8 +10,8 @@ from typing import Final
 from app.errors import UsageError
 from app.model.address import Address
 from app.wire.frame import Can, Direction, Frame
-from app.wire.trace import Item, Tone, TraceRow, direction_of
-from app.wire.trace_service import Service, Speaker
+from app.wire.trace.service import Service, Speaker
+from app.wire.trace.tracer import Item, Tone, TraceRow, direction_of
 
 _IDS: Final = re.compile(r"^([0-9A-Fa-f]{1,8})h?(?:-([0-9A-Fa-f]{1,8})h?)?$")
 _BYTES: Final = re.compile(r"^\*?(?:[0-9A-Fa-f?]{2})+$")

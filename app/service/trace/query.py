@@ -11,11 +11,11 @@ from app.model.address import Address
 from app.model.description import Description
 from app.model.texts import LANGUAGES, load_texts
 from app.service.devices import Target
-from app.service.trace_text import Namer, TraceNote, details_text, notes_of
+from app.service.trace.text import Namer, TraceNote, details_text, notes_of
 from app.wire.frame import Direction
-from app.wire.trace import Tone, TraceRow
-from app.wire.trace_filter import MeansText, TraceFilter, addresses_of, parse_data, parse_ids
-from app.wire.trace_service import Service
+from app.wire.trace.filter import MeansText, TraceFilter, addresses_of, parse_data, parse_ids
+from app.wire.trace.service import Service
+from app.wire.trace.tracer import Tone, TraceRow
 
 _PLAIN: Final = (Service.SDO_REQUEST, Service.SDO_RESPONSE, Service.TPDO, Service.RPDO)
 

@@ -17,11 +17,11 @@ from typing import Any, Final, Literal
 from app.recording.content import Keyframe
 from app.recording.reader import Recording, open_recording
 from app.service.connection import Connection
-from app.service.trace_log import BusTrace
-from app.service.trace_query import TraceQuery, filter_of
-from app.service.trace_text import Namer, TraceLine, line
-from app.wire.trace import Item, Tracer, TraceRow
-from app.wire.trace_filter import TraceFilter
+from app.service.trace.log import BusTrace
+from app.service.trace.query import TraceQuery, filter_of
+from app.service.trace.text import Namer, TraceLine, line
+from app.wire.trace.filter import TraceFilter
+from app.wire.trace.tracer import Item, Tracer, TraceRow
 
 MAX_SCANNED: Final = 50_000
 """Items looked at for one page, a bus: with a filter that hardly anything passes, the page says how far it got."""

@@ -27,8 +27,8 @@ from app.wire.records import (
     ValueSeen,
 )
 from app.wire.sdo import abort_text_key
-from app.wire.trace import Step, TraceRow, direction_of
-from app.wire.trace_service import Service
+from app.wire.trace.service import Service
+from app.wire.trace.tracer import Step, TraceRow, direction_of
 
 ToneName = Literal["plain", "warning", "error"]
 DirectionName = Literal["rx", "tx"]

@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from typing import Final, NamedTuple
 
 from app.wire.frame import Can, Frame
-from app.wire.trace import Item
+from app.wire.trace.tracer import Item
 
 SECOND_NS: Final = 1_000_000_000
 MAX_IDENTIFIERS: Final = 4096

@@ -16,7 +16,7 @@ from struct import Struct
 from typing import Any, Final
 
 from app.wire.frame import Can, Direction, Frame
-from app.wire.trace import Gap, Item
+from app.wire.trace.tracer import Gap, Item
 
 LIMIT: Final = 200_000
 """Items kept of a bus: 6 MB; 25 s of a full bus of 1 Mbit/s, some minutes of a usual one."""

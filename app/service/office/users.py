@@ -13,8 +13,8 @@ from typing import Final
 
 from app.errors import LastExpertError, LoginError, UserExistsError, UserRuleError, UserUnknownError
 from app.model.roles import Role
-from app.service.audit import Action, AuditLog
-from app.service.passwords import Passwords
+from app.service.office.audit import Action, AuditLog
+from app.service.office.passwords import Passwords
 from app.store import user_rows
 from app.store.store import Store
 from app.store.user_rows import User, name_key

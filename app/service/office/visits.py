@@ -12,9 +12,9 @@ from app.errors import NoVisitError
 from app.model.address import Address
 from app.model.datatypes import Raw
 from app.model.sets import Identity, Origin, ParameterSet, dump_set, load_set
-from app.service.audit import Action, AuditLog
 from app.service.backup import IDENTITY, readable
 from app.service.devices import Target, decode
+from app.service.office.audit import Action, AuditLog
 from app.store import visit_rows
 from app.store.store import Store
 from app.store.uuid7 import Uuid7

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from app.service.audit import AuditLog
 from app.service.journal import Journal
-from app.service.sessions import Sessions
-from app.service.users import Users
-from app.service.visits import Visits
+from app.service.office.audit import AuditLog
+from app.service.office.sessions import Sessions
+from app.service.office.users import Users
+from app.service.office.visits import Visits
 from app.store.store import Store
 
 

@@ -1,0 +1,1 @@
+"""People and their work: users, sessions, visits, the audit log."""

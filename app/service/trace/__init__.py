@@ -1,0 +1,1 @@
+"""What crossed the buses, for people who look at frames."""
