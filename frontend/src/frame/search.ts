@@ -37,7 +37,7 @@ export interface PageSearch {
   span?: string;
   /** Name of the recording or set that is open. */
   file?: string;
-  /** Filter, order (column, minus sign where descending) and hidden columns of the tables of files and sets. */
+  /** Filter, order (column, minus sign where descending) and hidden columns of the tables of files, sets and the bus. */
   find?: string;
   order?: string;
   less?: string;

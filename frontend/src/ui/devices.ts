@@ -1,4 +1,5 @@
 import { useQuery } from "@tanstack/react-query";
+import { useCallback } from "react";
 import { turbineQuery } from "../api/queries";
 import type { DeviceRef, StationRef, Turbine } from "../api/types";
 import { type Translate, useTexts } from "../texts/texts";
@@ -23,8 +24,11 @@ export function stationName(station: StationRef, t: Translate): string {
 export function useDeviceName(): (slug: string) => string {
   const t = useTexts();
   const turbine = useQuery(turbineQuery).data;
-  return (slug) => {
-    const place = placesOf(turbine).find((one) => one.device.slug === slug);
-    return place ? `${stationName(place.station, t)} ${place.device.name}` : lastOf(slug);
-  };
+  return useCallback(
+    (slug) => {
+      const place = placesOf(turbine).find((one) => one.device.slug === slug);
+      return place ? `${stationName(place.station, t)} ${place.device.name}` : lastOf(slug);
+    },
+    [turbine, t],
+  );
 }

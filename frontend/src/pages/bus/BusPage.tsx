@@ -5,6 +5,7 @@ import { useBench } from "../../live/live";
 import { useTexts } from "../../texts/texts";
 import classes from "./Bus.module.css";
 import { EmcyLog } from "./EmcyLog";
+import { NO_VIEW } from "./filter";
 import { IdentifierTable } from "./IdentifierTable";
 import { LoadView } from "./LoadView";
 import { NodeTable } from "./NodeTable";
@@ -34,7 +35,7 @@ export function BusPage() {
     <div className={classes.page}>
       <Tabs
         value={name}
-        onChange={(to) => update({ tab: isView(to) && to !== "trace" ? to : undefined })}
+        onChange={(to) => update({ ...NO_VIEW, tab: isView(to) && to !== "trace" ? to : undefined })}
         aria-label={t("trace.tab.label")}
       >
         <Tabs.List>

@@ -6,9 +6,10 @@ import { usePageSearch } from "../../frame/search";
 import { useServerNow } from "../../live/live";
 import { figure } from "../../model/values";
 import { useTexts } from "../../texts/texts";
+import { DataTable, type TableColumn } from "../../ui/DataTable";
 import { useDeviceName } from "../../ui/devices";
 import { age } from "../../ui/format";
-import { type DataColumn, DataTable } from "./DataTable";
+import { NO_VIEW } from "./filter";
 import { Share } from "./Share";
 
 const NOW_MS = 500;
@@ -22,7 +23,7 @@ export function NodeTable() {
   const rows = useQuery(nodesQuery).data ?? [];
   const nowMs = useServerNow(NOW_MS);
   const most = Math.max(...rows.map((row) => row.load), 0.001);
-  const columns = useMemo((): DataColumn<BusNode>[] => {
+  const columns = useMemo((): TableColumn<BusNode>[] => {
     const agoOf = (tNs: number) => age(nowMs - tNs / 1e6, t.language);
     const stateOf = (row: BusNode) =>
       !row.seen
@@ -60,18 +61,31 @@ export function NodeTable() {
         .filter(Boolean)
         .join(" · ");
     return [
-      { id: "node", width: "62px", text: (row) => String(row.node), order: (row) => row.node },
+      {
+        id: "node",
+        title: t("trace.column.node"),
+        width: "62px",
+        text: (row) => String(row.node),
+        by: (row) => row.node,
+      },
       {
         id: "device",
+        title: t("trace.column.device"),
         width: "minmax(120px, 1.2fr)",
         text: (row) => (row.device === null ? t("trace.table.foreign") : nameOf(row.device)),
       },
-      { id: "name", width: "minmax(110px, 1.3fr)", text: (row) => row.device_name ?? "–" },
+      {
+        id: "name",
+        title: t("trace.column.name"),
+        width: "minmax(110px, 1.3fr)",
+        text: (row) => row.device_name ?? "–",
+      },
       {
         id: "nmt",
+        title: t("trace.column.nmt"),
         width: "140px",
         text: stateOf,
-        show: (row) => (
+        cell: (row) => (
           <span
             className={
               row.silent || !row.seen ? "tone-error" : row.nmt === "nmt.state.operational" ? "tone-ok" : ""
@@ -83,38 +97,63 @@ export function NodeTable() {
       },
       {
         id: "heartbeat",
+        title: t("trace.column.heartbeat"),
         width: "160px",
         text: heartbeatOf,
-        order: (row) => -(row.heartbeat_t_ns ?? 0),
-        show: (row) => (
+        by: (row) => -(row.heartbeat_t_ns ?? 0),
+        cell: (row) => (
           <span className={late(row) ? "tone-warning" : ""}>
             {heartbeatOf(row)}
             {late(row) && ` · ${t("trace.table.late")}`}
           </span>
         ),
       },
-      { id: "boots", width: "62px", text: (row) => String(row.boots), order: (row) => row.boots },
+      {
+        id: "boots",
+        title: t("trace.column.boots"),
+        width: "62px",
+        text: (row) => String(row.boots),
+        by: (row) => row.boots,
+      },
       {
         id: "share",
+        title: t("trace.column.share"),
         width: "120px",
         text: (row) => `${figure(row.load * 100, 2, t.language)} %`,
-        order: (row) => row.load,
-        show: (row) => (
+        by: (row) => row.load,
+        cell: (row) => (
           <Share share={row.load} most={most} text={`${figure(row.load * 100, 2, t.language)} %`} />
         ),
       },
-      { id: "emcy", width: "minmax(140px, 1.6fr)", text: emcyOf, order: (row) => -(row.emcy_t_ns ?? 0) },
-      { id: "sdo", width: "minmax(120px, 1fr)", text: sdoOf, order: (row) => row.sdo_count },
+      {
+        id: "emcy",
+        title: t("trace.column.emcy"),
+        width: "minmax(140px, 1.6fr)",
+        text: emcyOf,
+        by: (row) => -(row.emcy_t_ns ?? 0),
+      },
+      {
+        id: "sdo",
+        title: t("trace.column.sdo"),
+        width: "minmax(120px, 1fr)",
+        text: sdoOf,
+        by: (row) => row.sdo_count,
+      },
     ];
   }, [t, nameOf, nowMs, most]);
   return (
     <DataTable
+      label={t("trace.tab.nodes")}
       name="nodes"
+      fileName="bus-nodes"
+      empty={t("trace.table.none")}
+      dense
+      live
       rows={rows}
       columns={columns}
-      keyOf={(row) => `${row.bus}-${String(row.node)}`}
-      tone={(row) => (row.silent ? "error" : "plain")}
-      onOpen={(row) => update({ tab: undefined, q: undefined, sort: undefined, nodes: String(row.node) })}
+      idOf={(row) => `${row.bus}-${String(row.node)}`}
+      toneOf={(row) => (row.silent ? "error" : "plain")}
+      onOpen={(row) => update({ tab: undefined, q: undefined, ...NO_VIEW, nodes: String(row.node) })}
     />
   );
 }

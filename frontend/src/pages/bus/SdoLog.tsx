@@ -5,9 +5,10 @@ import { type SdoLine, transfersQuery } from "../../api/trace";
 import { usePageSearch } from "../../frame/search";
 import { figure } from "../../model/values";
 import { useTexts } from "../../texts/texts";
+import { DataTable, type TableColumn } from "../../ui/DataTable";
 import { useDeviceName } from "../../ui/devices";
 import { timeOfDay } from "../../ui/format";
-import { type DataColumn, DataTable } from "./DataTable";
+import { NO_VIEW } from "./filter";
 import { objectName, valueText } from "./lines";
 
 const CHOICES = ["writes", "failed", "all"];
@@ -20,21 +21,39 @@ export function SdoLog() {
   const which = CHOICES.find((one) => one === search.kind) ?? "writes";
   const rows = useQuery({ ...transfersQuery(which), placeholderData: keepPreviousData }).data ?? [];
   const columns = useMemo(
-    (): DataColumn<SdoLine>[] => [
-      { id: "time", width: "104px", text: (row) => timeOfDay(row.t_ns / 1e6), order: (row) => row.t_ns },
-      { id: "who", width: "110px", text: (row) => t(row.ours ? "trace.page.ours" : "trace.page.other") },
+    (): TableColumn<SdoLine>[] => [
+      {
+        id: "time",
+        title: t("trace.column.time"),
+        width: "104px",
+        text: (row) => timeOfDay(row.t_ns / 1e6),
+        by: (row) => row.t_ns,
+      },
+      {
+        id: "who",
+        title: t("trace.column.who"),
+        width: "110px",
+        text: (row) => t(row.ours ? "trace.page.ours" : "trace.page.other"),
+      },
       {
         id: "node",
+        title: t("trace.column.node"),
         width: "minmax(110px, 0.8fr)",
         text: (row) => `${String(row.node)} ${row.device === null ? "" : nameOf(row.device)}`,
-        order: (row) => row.node,
+        by: (row) => row.node,
       },
-      { id: "access", width: "82px", text: (row) => t(`trace.table.${row.access}`) },
+      {
+        id: "access",
+        title: t("trace.column.access"),
+        width: "82px",
+        text: (row) => t(`trace.table.${row.access}`),
+      },
       {
         id: "address",
+        title: t("trace.column.address"),
         width: "minmax(160px, 1.6fr)",
         text: (row) => `${row.item.address} ${objectName(row.item, t)}`,
-        show: (row) => (
+        cell: (row) => (
           <>
             <code>{row.item.address}</code> {objectName(row.item, t)}
           </>
@@ -42,12 +61,14 @@ export function SdoLog() {
       },
       {
         id: "value",
+        title: t("trace.column.value"),
         width: "minmax(90px, 1fr)",
         text: (row) => valueText(row.item, t) || "–",
-        show: (row) => <b>{valueText(row.item, t) || "–"}</b>,
+        cell: (row) => <b>{valueText(row.item, t) || "–"}</b>,
       },
       {
         id: "result",
+        title: t("trace.column.result"),
         width: "minmax(110px, 1.4fr)",
         text: (row) =>
           [t(`trace.outcome.${row.outcome}`), row.abort === null ? "" : t("trace.note.abort", row.abort)]
@@ -56,20 +77,26 @@ export function SdoLog() {
       },
       {
         id: "took",
+        title: t("trace.column.took"),
         width: "84px",
+        numeric: true,
         text: (row) => `${figure(row.took_ms, 1, t.language)} ms`,
-        order: (row) => row.took_ms,
+        by: (row) => row.took_ms,
       },
     ],
     [t, nameOf],
   );
   return (
     <DataTable
+      label={t("trace.tab.sdo")}
       name="sdo"
+      fileName="bus-sdo"
+      empty={t("trace.table.none")}
+      dense
       rows={rows}
       columns={columns}
-      keyOf={(row) => `${row.bus}-${String(row.t_ns)}`}
-      tone={(row) => (row.outcome === "done" ? "plain" : row.outcome === "lost" ? "warning" : "error")}
+      idOf={(row) => `${row.bus}-${String(row.t_ns)}`}
+      toneOf={(row) => (row.outcome === "done" ? "plain" : row.outcome === "lost" ? "warning" : "error")}
       onOpen={(row) => update({ ...TO_TRACE, frame: BigInt(row.t_ns).toString() })}
       tools={
         <SegmentedControl
@@ -88,7 +115,7 @@ export function SdoLog() {
 export const TO_TRACE = {
   tab: undefined,
   q: undefined,
-  sort: undefined,
+  ...NO_VIEW,
   kind: undefined,
   nodes: undefined,
   services: undefined,

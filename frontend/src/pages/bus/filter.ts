@@ -32,6 +32,9 @@ export function isFiltered(search: PageSearch): boolean {
   return [nodes, services, dir, ids, data, q, errors].some((part) => part !== undefined);
 }
 
+/** A table without its filter, order and choice of columns. */
+export const NO_VIEW = { find: undefined, order: undefined, less: undefined } as const;
+
 export const NO_FILTER = {
   nodes: undefined,
   services: undefined,
