@@ -1,6 +1,6 @@
 import { CloseButton, TextInput } from "@mantine/core";
 import { IconArrowDown, IconArrowUp, IconFilter } from "@tabler/icons-react";
-import { type KeyboardEvent, type ReactNode, useRef } from "react";
+import { type KeyboardEvent, type ReactNode, useDeferredValue, useRef } from "react";
 import { usePageSearch } from "../frame/search";
 import { useTexts } from "../texts/texts";
 import classes from "./DataTable.module.css";
@@ -39,15 +39,18 @@ const GAP_PX = 12;
 
 /** A table with filter, order, choice of columns, copy, export and keyboard; only the rows in view are drawn. */
 export function DataTable<Row>(props: Props<Row>) {
-  const { label, rows, columns, idOf, fileName, empty, tools, name = "row", dense = false } = props;
+  const { label, rows, columns, idOf, fileName, empty, tools } = props;
+  const { name = "row", dense = false, live = false, hiddenFirst = NO_COLUMNS } = props;
   const t = useTexts();
   const [search, update] = usePageSearch();
-  const [find, setFind] = useTyped(search.find ?? "", (typed) => update({ find: typed }));
+  const [typed, setTyped] = useTyped(search.find ?? "", (text) => update({ find: text }));
+  // The letter first, then the rows.
+  const find = useDeferredValue(typed);
   const view = { find, order: search.order, less: search.less };
-  const table = useArranged({ rows, columns, idOf, view, onView: update, ...hiddenOf(props) });
+  const table = useArranged({ rows, columns, idOf, view, onView: update, hiddenFirst });
   const section = useRef<HTMLElement>(null);
   const found = table.getRowModel().rows.map((line) => line.original.row);
-  const { rows: shown, hold } = useHeld(found, idOf, `${search.order ?? ""} ${find}`, props.live === true);
+  const { rows: shown, hold } = useHeld(found, idOf, `${search.order ?? ""} ${find}`, live);
   const visible = columns.filter((column) => table.getColumn(column.id)?.getIsVisible() !== false);
   const look = {
     gridTemplateColumns: visible.map((column) => column.width).join(" "),
@@ -72,12 +75,12 @@ export function DataTable<Row>(props: Props<Row>) {
           leftSection={<IconFilter size={17} aria-hidden />}
           rightSectionWidth={40}
           rightSection={
-            find !== "" && (
-              <CloseButton aria-label={t("page.table.clear_filter")} onClick={() => setFind("")} />
+            typed !== "" && (
+              <CloseButton aria-label={t("page.table.clear_filter")} onClick={() => setTyped("")} />
             )
           }
-          value={find}
-          onChange={(event) => setFind(event.currentTarget.value)}
+          value={typed}
+          onChange={(event) => setTyped(event.currentTarget.value)}
           onKeyDown={onFilterKey}
           data-testid="find"
         />
@@ -106,8 +109,6 @@ export function DataTable<Row>(props: Props<Row>) {
     </section>
   );
 }
-
-const hiddenOf = <Row,>({ hiddenFirst = NO_COLUMNS }: Props<Row>) => ({ hiddenFirst });
 
 interface HeadProps<Row> {
   table: ArrangedTable<Row>;
