@@ -53,14 +53,17 @@ function haltLines(halt: Halt, result: StopResult, t: Translate, nameOf: (slug: 
 type StopRequest = () => void;
 let stopNow: StopRequest | null = null;
 
+/** Gives the Esc key what it does; the returned function takes it back. */
+export function lendStop(stop: StopRequest): () => void {
+  stopNow = stop;
+  return () => {
+    stopNow = null;
+  };
+}
+
 /** The STOP button lends its action to the Esc key. */
 export function useLendStop(stop: StopRequest): void {
-  useEffect(() => {
-    stopNow = stop;
-    return () => {
-      stopNow = null;
-    };
-  }, [stop]);
+  useEffect(() => lendStop(stop), [stop]);
 }
 
 /** While anything can move, Esc is STOP and nothing else. Taken in the capture phase, before any dialog sees it. */

@@ -195,7 +195,7 @@ function Row({ row, raw, context, device }: RowProps) {
 function Why({ failure, device, t }: { failure: Failure; device: string; t: Translate }) {
   const axes = useAxes();
   const node = store.nodes.get(device);
-  const blade = node ? [...axes.values()].find((axis) => device.includes(`/${axis.station}/`)) : undefined;
+  const blade = node ? [...axes.values()].find((axis) => device.startsWith(`${axis.station}/`)) : undefined;
   const state = blade?.state ?? null;
   const story = storyOf(
     new Problem({

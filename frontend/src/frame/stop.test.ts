@@ -1,0 +1,71 @@
+import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
+import type { AxisData, LinkData } from "../api/types";
+import { store } from "../live/live";
+import { lendStop, stopOnEscape } from "./stop";
+
+/** One function hears the keys of the page and those of the 3D frame. */
+function press(key: string, repeat = false): boolean {
+  let taken = false;
+  const take = () => {
+    taken = true;
+  };
+  stopOnEscape({
+    key,
+    repeat,
+    preventDefault: take,
+    stopImmediatePropagation: take,
+  } as unknown as KeyboardEvent);
+  return taken;
+}
+
+function tell(state: string | null, link: "connected" | "lost" | "disconnected" = "connected"): void {
+  const envelope = { v: 1, ctx: "live", seq: 1, t_ns: 1e9 } as const;
+  store.apply({ ...envelope, type: "link", data: { state: link, load: 0 } as LinkData });
+  const axis = { blade: 1, state, stale: false, velocity_dps: 0 } as AxisData;
+  store.apply({ ...envelope, type: "axes", data: [axis] });
+}
+
+describe("Esc", () => {
+  let stops = 0;
+  let takeBack: () => void;
+
+  beforeEach(() => {
+    vi.stubGlobal("document", { hidden: true });
+    stops = 0;
+    takeBack = lendStop(() => {
+      stops += 1;
+    });
+  });
+
+  afterEach(() => {
+    takeBack();
+    vi.unstubAllGlobals();
+  });
+
+  it("is STOP and nothing else while an axis has power, once however long it is held", () => {
+    tell("state.operation_enabled");
+    expect(press("Escape")).toBe(true);
+    expect(press("Escape", true)).toBe(true);
+    expect(stops).toBe(1);
+  });
+
+  it("is STOP where the state of an axis is not known", () => {
+    tell(null);
+    expect(press("Escape")).toBe(true);
+    expect(stops).toBe(1);
+  });
+
+  it("is left to dialogs and menus while all axes are at rest, and where nothing is connected", () => {
+    tell("state.ready_to_switch_on");
+    expect(press("Escape")).toBe(false);
+    tell("state.operation_enabled", "disconnected");
+    expect(press("Escape")).toBe(false);
+    expect(stops).toBe(0);
+  });
+
+  it("leaves other keys alone", () => {
+    tell("state.operation_enabled");
+    expect(press("Enter")).toBe(false);
+    expect(stops).toBe(0);
+  });
+});
