@@ -11,7 +11,7 @@ import {
 import type { EventData } from "../api/types";
 import { useEvents } from "../live/live";
 import type { NumberedEvent } from "../live/store";
-import { csvOf, download } from "../pages/parameters/export";
+import { csvOf, download } from "../ui/export";
 import { type Translate, useTexts } from "../texts/texts";
 import { useDeviceName } from "../ui/devices";
 import { timeOfDay } from "../ui/format";

@@ -1,6 +1,6 @@
 import { ActionIcon, Menu, Tooltip } from "@mantine/core";
 import { IconCopy, IconDownload, IconSquare, IconSquareCheck, IconTable } from "@tabler/icons-react";
-import { csvOf, download, tsvOf } from "../pages/parameters/export";
+import { csvOf, download, tsvOf } from "./export";
 import { useTexts } from "../texts/texts";
 import type { ArrangedTable, TableColumn } from "./arrange";
 import { notify } from "./notices";

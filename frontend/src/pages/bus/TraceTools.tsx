@@ -18,7 +18,7 @@ import { usePageSearch } from "../../frame/search";
 import { useTexts } from "../../texts/texts";
 import { useDeviceName } from "../../ui/devices";
 import { notify } from "../../ui/notices";
-import { csvOf, download, tsvOf } from "../parameters/export";
+import { csvOf, download, tsvOf } from "../../ui/export";
 import classes from "./Bus.module.css";
 import { Direction } from "./Direction";
 import { GROUPS, isFiltered, listOf, NO_FILTER } from "./filter";

@@ -6,7 +6,7 @@ import { useTexts } from "../../texts/texts";
 import { notify } from "../../ui/notices";
 import { cellText, choicesOf, type ColumnSpec } from "./columns";
 import { type Bench, useBenchOfTable } from "./context";
-import { csvOf, download, tsvOf } from "./export";
+import { csvOf, download, tsvOf } from "../../ui/export";
 
 /** What the table shows at this moment, in its order. */
 export type Visible = RefObject<{ rows: readonly ParameterRow[]; columns: readonly ColumnSpec[] }>;

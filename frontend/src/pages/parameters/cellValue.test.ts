@@ -3,7 +3,7 @@ import type { EntryDoc } from "../../api/types";
 import type { Cell } from "../../live/store";
 import { differsFromDefault, isStale, isStoredUnknown, isUnsaved, rawOf } from "./cellValue";
 import { compareRaw } from "./columns";
-import { csvOf, tsvOf } from "./export";
+import { csvOf, tsvOf } from "../../ui/export";
 
 const NOW_MS = 1_700_000_000_000;
 const entry = (change: Partial<EntryDoc> = {}) =>

@@ -25,7 +25,7 @@ import { useDeviceName } from "../../ui/devices";
 import { notify } from "../../ui/notices";
 import { ProblemAlert } from "../../ui/ProblemAlert";
 import { storyOf } from "../../ui/problem";
-import { csvOf, download } from "../parameters/export";
+import { csvOf, download } from "../../ui/export";
 import { dateTime } from "./dateTime";
 import classes from "./Settings.module.css";
 
