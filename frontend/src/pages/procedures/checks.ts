@@ -138,8 +138,12 @@ export const PROCEDURES: readonly Procedure[] = [
       {
         key: "nothing_unsaved",
         to: "/parameters",
-        check: (facts) =>
-          connected(facts) && readOf(facts) > 0 ? tick(countsOf(facts).unsaved === 0) : Tick.Unknown,
+        check: (facts) => {
+          // As long as nothing was written there is nothing to tick.
+          const { unsaved, saved, proven } = countsOf(facts);
+          if (!connected(facts) || unsaved + saved + proven === 0) return Tick.Unknown;
+          return tick(unsaved === 0);
+        },
         details: (facts) => ({ count: countsOf(facts).unsaved }),
       },
       {
@@ -168,8 +172,12 @@ export const PROCEDURES: readonly Procedure[] = [
       {
         key: "written_and_saved",
         to: "/parameters",
-        check: (facts) =>
-          connected(facts) && readOf(facts) > 0 ? tick(countsOf(facts).unsaved === 0) : Tick.Unknown,
+        check: (facts) => {
+          // As long as nothing was written there is nothing to tick.
+          const { unsaved, saved, proven } = countsOf(facts);
+          if (!connected(facts) || unsaved + saved + proven === 0) return Tick.Unknown;
+          return tick(unsaved === 0);
+        },
         details: (facts) => ({ count: countsOf(facts).unsaved }),
       },
       {
