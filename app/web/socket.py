@@ -89,6 +89,7 @@ class Feed:
         self._topics: frozenset[str] = frozenset()
         self._devices: frozenset[str] = frozenset()
         self._fresh: set[str] = set()
+        self._wanted: tuple[frozenset[str], TraceQuery] | None = None
         self._cursor = 0
         self._since = 0
         self._seq = 0
@@ -112,13 +113,19 @@ class Feed:
     def subscribe(self, topics: list[str], trace: TraceQuery | None = None) -> None:
         """Replace the topics. Each topic's snapshot comes again, past events only where they are a new topic.
 
-        Topics that do not exist are passed over.
+        Topics that do not exist are passed over. It holds from the next ``due`` on: a client may ask for others while
+        the messages of this moment are on their way to it.
         """
-        before, self._topics = self._topics, frozenset(topics)
-        wanted = trace or TraceQuery()
-        if "trace" not in self._topics or wanted != self._trace_query:
-            self._trace, self._trace_query = None, wanted
-        self._start_over(before & {"events"})
+        self._wanted = (frozenset(topics), trace or TraceQuery())
+
+    def _take_wanted(self) -> None:
+        if self._wanted is None:
+            return
+        (self._topics, query), self._wanted = self._wanted, None
+        if "trace" not in self._topics or query != self._trace_query:
+            self._trace, self._trace_query = None, query
+        self._told_events = self._told_events and "events" in self._topics
+        self._start_over(frozenset({"events"} if self._told_events else ()))
 
     def _start_over(self, known: frozenset[str] = frozenset()) -> None:
         """Have the snapshots of all topics told again, but for those in ``known``."""
@@ -134,6 +141,7 @@ class Feed:
 
     def due(self, now_s: float) -> Iterator[ServerMessage]:
         """The messages of this moment. ``now_s`` is a monotonic time in s."""
+        self._take_wanted()
         if self._bench.epoch != self._epoch:
             yield self._turn()
         changes = self._changes()

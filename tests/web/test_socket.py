@@ -16,7 +16,7 @@ import websockets
 from app.model.address import Address
 from app.model.datatypes import DataType, encode_raw
 from app.service.journal import Kind
-from app.web.socket import HEARTBEAT_S
+from app.web.socket import HEARTBEAT_S, Feed
 from app.wire import sdo
 from app.wire.frame import Can, Direction, Frame
 from app.wire.twin_environment import CAN_ID, TwinEnvironment, pack_environment
@@ -305,3 +305,25 @@ async def test_rotor_and_wind_are_told_where_a_twin_tells_them(server: Server, p
     assert (known["t_ns"], known["stale"]) == (frame.t_ns, False)
     stale = (await page.until("rotor", lambda line: line["stale"]))["data"]
     assert stale["azimuth_deg"] == 12.5
+
+
+async def test_past_events_are_told_however_fast_a_page_asks_again() -> None:
+    """Topics that are replaced before anything of them was told, and topics asked for while messages are on their way."""
+    async with running() as server:
+        server.bench.journal.note(Kind.CONNECTED, None, bus="can0", adapter="x")
+        hasty = Feed(server.bench)
+        hasty.subscribe(["link", "events"])
+        hasty.subscribe(["link", "events", "axes"])
+        assert [m.data.text_key for m in hasty.due(0.0) if m.type == "event"] == ["journal.connected"]
+
+        midway = Feed(server.bench)
+        midway.subscribe(["link", "nodes", "axes"])
+        messages = midway.due(0.0)
+        next(messages)
+        midway.subscribe(["link", "nodes", "axes", "events"])
+        told = [*messages, *midway.due(0.02)]
+        assert [m.data.text_key for m in told if m.type == "event"] == ["journal.connected"]
+        midway.subscribe(["events"])
+        assert not [m for m in midway.due(0.04) if m.type == "event"]
+        for feed in (hasty, midway):
+            feed.close()
