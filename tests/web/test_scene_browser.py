@@ -170,11 +170,11 @@ async def was_told(page: Page, kind: str) -> bool:
 
 async def place(page: Page, name: str) -> Any:
     """Where a label belongs, once the scene is there and can be hit."""
-    message = await told(page, "places", lambda _message: True)
     async with asyncio.timeout(DEADLINE_S):
         while True:
             if blade_is_seen(await picture_of(page), BladeState.WARNING):
                 break
+    message = await told(page, "places", lambda _message: True)
     return next(one for one in message["places"] if one["id"] == name)
 
 
