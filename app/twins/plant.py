@@ -7,6 +7,7 @@ torque that is given from outside.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import Enum
 from math import copysign, degrees, pi, radians
 from typing import Final
 
@@ -70,6 +71,24 @@ SWITCH_95: Final = Switch(95.0)
 """The 95 degree switch, by its name."""
 
 
+class BrakeFault(Enum):
+    """What may be wrong with the holding brake."""
+
+    NONE = "none"
+    ENGAGED = "stays engaged"
+    LIFTED = "stays lifted"
+
+
+class EncoderFault(Enum):
+    """What may be wrong with the motor encoder."""
+
+    NONE = "none"
+    SINE_COSINE = "sine and cosine lost"
+    """The count stands still."""
+    DATA_CHANNEL = "data channel lost"
+    """The count goes on, the serial channel is silent."""
+
+
 class AxisPlant:
     """State of one axis. ``..._zero_deg``: blade angles at which the encoders count 0 (how they were fitted)."""
 
@@ -84,6 +103,16 @@ class AxisPlant:
         self.brake_lifted = False
         self.load_torque_nm = 0.0
         """From blade weight and wind, at the motor shaft; positive drives towards larger angles."""
+        self.azimuth_deg = 0.0
+        """Of this blade; 0: it points up."""
+        self.wind_mps = 0.0
+        self.extra_load_nm = 0.0
+        """About the pitch axis of the blade, on top of weight and wind."""
+        self.brake_stuck = BrakeFault.NONE
+        self.encoder_fault = EncoderFault.NONE
+        self.blade_encoder_failed = False
+        self.blade_encoder_slip_deg = 0.0
+        """How far the blade encoder has slipped on its shaft, as an angle of the blade."""
         self.at_0 = self.at_90 = self.at_95 = False
         self.shaft_rad = 0.0
         self.speed_rad_s = 0.0
