@@ -1,4 +1,4 @@
-"""The plain model of rotor and wind, and the frame by which the twins tell it."""
+"""The plain model of the rotor, what it does to the axes, and the frame by which the twins tell it."""
 
 from __future__ import annotations
 
@@ -7,14 +7,16 @@ import pytest
 from app.drivers.listening import BusWatch
 from app.twins.line import CanLine
 from app.twins.plant import AxisPlant
-from app.twins.rotor import RATED_RPM, Rotor, RotorConstants, idle_rpm
+from app.twins.rotor import RATED_RPM, RPM, Rotor, RotorConstants, idle_rpm, torque_line
 from app.twins.surroundings import PERIOD_NS, Surroundings
+from app.twins.wind import WindConstants
 from app.wire.frame import Can, Direction, Frame
 from app.wire.twin_environment import CAN_ID, parse_environment
 
 FEATHER = (90.0, 90.0, 90.0)
 WORKING = (0.0, 0.0, 0.0)
 SECOND = 1_000_000_000
+CALM = WindConstants(spread_mps=0.0, direction_spread_deg=0.0)
 
 
 def run(rotor: Rotor, seconds: float, pitch: tuple[float, ...]) -> None:
@@ -49,25 +51,43 @@ def test_the_more_pitch_the_slower() -> None:
     assert idle_rpm(8.0, (-200.0,)) == idle_rpm(8.0, (0.0,))
 
 
+def test_a_generator_holds_the_speed_at_which_its_torque_is_that_of_the_wind() -> None:
+    rotor = Rotor(1, RotorConstants(friction_nms=0.0), CALM)
+    start_nm, slope_nms = torque_line(7.5, WORKING, 0.0)
+    rotor.generator_nm = start_nm / 3
+    run(rotor, 600, WORKING)
+    assert rotor.speed_rpm == pytest.approx(start_nm * 2 / 3 / slope_nms * RPM, rel=1e-6)
+    rotor.generator_nm = 0.0
+    run(rotor, 200, WORKING)
+    assert rotor.speed_rpm > RATED_RPM  # nothing bounds it but the wind
+    rotor.generator_nm = 2 * start_nm
+    run(rotor, 600, WORKING)
+    assert rotor.speed_rpm == pytest.approx(0.0, abs=1e-6)
+
+
+def test_feathered_at_rated_speed_it_is_braked_within_some_ten_seconds() -> None:
+    rotor = Rotor(1, None, WindConstants(mean_mps=12.0, spread_mps=0.0))
+    rotor.speed_rpm, rotor.generator_nm = RATED_RPM, 0.0
+    run(rotor, 4, FEATHER)
+    assert 0.2 * RATED_RPM < rotor.speed_rpm < 0.5 * RATED_RPM
+    run(rotor, 12, FEATHER)
+    assert rotor.speed_rpm < 0.1 * RATED_RPM
+
+
+def test_a_step_is_exact_whatever_its_length() -> None:
+    fine, coarse = Rotor(1, None, CALM), Rotor(1, None, CALM)
+    run(fine, 10, (20.0,) * 3)
+    coarse.step(10.0, (20.0,) * 3)
+    assert fine.speed_rpm == pytest.approx(coarse.speed_rpm, rel=1e-9)
+
+
 def test_the_azimuth_follows_the_speed() -> None:
-    calm = RotorConstants(wind_spread_mps=0.0, direction_spread_deg=0.0, rotor_time_s=1e-9)
-    rotor = Rotor(1, calm)
+    rotor = Rotor(1, RotorConstants(inertia_kgm2=1e-9), CALM)
     rotor.step(1.0, (45.0,))
     assert rotor.azimuth_deg == pytest.approx(rotor.speed_rpm * 6.0)
     for _ in range(100):
         rotor.step(1.0, (45.0,))
         assert 0.0 <= rotor.azimuth_deg < 360.0
-
-
-def test_the_wind_stays_around_its_mean_whatever_the_step() -> None:
-    for dt_s in (0.1, 5.0):
-        rotor, winds = Rotor(4), []
-        for _ in range(4000):
-            rotor.step(dt_s, FEATHER)
-            winds.append(rotor.wind_mps)
-        mean = sum(winds) / len(winds)
-        assert mean == pytest.approx(rotor.constants.mean_wind_mps, abs=0.6)
-        assert min(winds) >= 0.0
 
 
 def told(line: CanLine) -> list[tuple[int, Can]]:
@@ -91,6 +111,23 @@ def test_ten_frames_a_second_follow_the_pitch_and_load_the_bus_little() -> None:
         axis.place(0.0)
     line.run_until(40 * SECOND)
     assert parse_environment(frames[-1][1].data).rotor_rpm > slow + 5
+
+
+def test_the_axes_feel_the_wind_and_their_azimuth() -> None:
+    line = CanLine(500_000)
+    axes = [AxisPlant(20.0) for _ in range(3)]
+    rotor = Rotor(1, None, CALM)
+    surroundings = Surroundings(line, rotor, axes)
+    surroundings.mean_wind_mps = 14.0
+    surroundings.start(line.now_ns)
+    assert [axis.wind_mps for axis in axes] == [14.0] * 3
+    assert [axis.azimuth_deg for axis in axes] == pytest.approx([0.0, 120.0, 240.0])
+    surroundings.gust(6.0, rise_s=1.0, hold_s=20.0, fall_s=1.0)
+    line.run_until(10 * SECOND)
+    assert surroundings.mean_wind_mps == 14.0
+    assert [axis.wind_mps for axis in axes] == pytest.approx([20.0] * 3)
+    assert rotor.azimuth_deg > 0.0
+    assert [axis.azimuth_deg for axis in axes] == pytest.approx([(rotor.azimuth_deg + n) % 360 for n in (0, 120, 240)])
 
 
 def test_once_stopped_it_is_silent() -> None:
