@@ -1,4 +1,4 @@
-"""What surrounds the axes of a twin turbine: rotor and wind act on them and are told on the line, ten times a second."""
+"""What surrounds the axes of a twin turbine: rotor and wind act on them and are told on the line ten times a second."""
 
 from __future__ import annotations
 
