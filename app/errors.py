@@ -31,13 +31,17 @@
     │   ├── UserUnknownError                no such user
     │   ├── UserExistsError                 the name is taken
     │   ├── UserRuleError                   a name or password that is not taken
-    │   └── LastExpertError                 one expert must remain
+    │   ├── LastExpertError                 one expert must remain
+    │   ├── NoInstructorError               the connected turbine is none of the twins that we started
+    │   └── FaultOrderError                 a fault that cannot be put into a twin so; names the field
+    │       └── FaultValueError             one of its values is out of range; names the limits
     ├── DeviceError                exit 4   the device answered and refused
     │   ├── SdoAbortError                   CiA 301 abort code
     │   └── IdentityError                   another device than expected answered
     ├── NoAnswerError              exit 5   nothing came in time
     │   ├── BusLostError                    the adapter or its server is gone
-    │   └── BusOpenError                    the adapter could not be opened
+    │   ├── BusOpenError                    the adapter could not be opened
+    │   └── TwinsGoneError                  the twins that we started do not answer
     ├── UnverifiedError            exit 6   sent, but what was read back differs or could not be read
     ├── RecordingError             exit 2   a recording is damaged or cannot be written
     └── ProtocolError              exit 4   bytes on the wire that no rule of the protocol allows
@@ -246,6 +250,24 @@ class LastExpertError(RefusedError):
     code = "last_expert"
 
 
+class NoInstructorError(RefusedError):
+    """Faults go only into twins that this server has started, and the connected turbine is none of them."""
+
+    code = "no_instructor"
+
+
+class FaultOrderError(RefusedError):
+    """A fault that cannot be put into a twin so. Details: field, reason."""
+
+    code = "fault_order"
+
+
+class FaultValueError(FaultOrderError):
+    """A value of the fault is out of range. Details: field, value, limits (as text), minimum, maximum, unit."""
+
+    code = "fault_value"
+
+
 class DeviceError(HubsideError):
     """The device answered and refused. Details: node, reason."""
 
@@ -290,6 +312,12 @@ class BusOpenError(NoAnswerError):
     """The adapter could not be opened. Details: bus, reason."""
 
     code = "bus_open"
+
+
+class TwinsGoneError(NoAnswerError):
+    """The twins that we started do not answer. Details: reason."""
+
+    code = "twins_gone"
 
 
 class UnverifiedError(HubsideError):

@@ -21,9 +21,16 @@ class Texts:
         self._fallback = fallback
 
     def __call__(self, key: str, /, **details: Any) -> str:
-        """The text of ``key`` with its placeholders filled; a placeholder without a detail becomes a dash."""
-        text = self._texts.get(key) or self._fallback.get(key) or key
-        return text.format_map(_Dashes({name: str(value) for name, value in details.items()}))
+        """The text of ``key`` with its placeholders filled; a placeholder without a detail becomes a dash.
+
+        A detail ``reason_key`` is the key of a text, which fills ``{reason}``.
+        """
+        words = {name.removesuffix("_key"): self._find(str(d)) for name, d in details.items() if name.endswith("_key")}
+        filled = {name: str(value) for name, value in details.items()}
+        return self._find(key).format_map(_Dashes(words | filled))
+
+    def _find(self, key: str) -> str:
+        return self._texts.get(key) or self._fallback.get(key) or key
 
     def name(self, english: str) -> str:
         """Translation of an object's name; the description's own name where there is none."""

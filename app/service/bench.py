@@ -14,6 +14,7 @@ from app.service.as_found import REASON, read_as_found, unreachable
 from app.service.backup import to_set
 from app.service.bitrates import with_bitrates
 from app.service.connection import Connection
+from app.service.instructor import Instructor, InstructorDesk
 from app.service.journal import Journal, Kind
 from app.service.link import TwinWatch
 from app.service.office.office import Office
@@ -42,7 +43,8 @@ class Bench:
 
     ``told`` hears of devices that could not be read after a connection was made. ``epoch`` is raised with every
     connection that is made or ended, so that whoever shows the live state knows that it is another one. What people do
-    is kept in ``store``, which the bench closes at its end; without one it is forgotten then.
+    is kept in ``store``, which the bench closes at its end; without one it is forgotten then. ``instructor`` reaches
+    the twins that were started with this server, where they were.
     """
 
     def __init__(
@@ -55,6 +57,7 @@ class Bench:
         store: Store | None = None,
         stamper: Stamper | None = None,
         journal: Journal | None = None,
+        instructor: Instructor | None = None,
     ) -> None:
         self.sites = sites
         self.options = options
@@ -70,6 +73,17 @@ class Bench:
         self._clocks = wall_ns, monotonic_ns
         self._changing = asyncio.Lock()
         self._look: asyncio.Task[None] | None = None
+        self.desk: InstructorDesk | None = None
+        if instructor is not None:
+            self.desk = InstructorDesk(instructor, self.journal, self.stamper, self._slug_of)
+
+    @property
+    def instructor(self) -> InstructorDesk | None:
+        """Faults for the twins; None where they are not ours, or where another turbine is connected."""
+        if self.desk is None or self.connection is None:
+            return self.desk
+        buses = self.connection.turbine.buses
+        return self.desk if self.desk.serves(bus.connection for bus in buses) else None
 
     def require(self) -> Connection:
         """The connection. Raises NotConnectedError."""
@@ -149,6 +163,10 @@ class Bench:
         self.epoch += 1
         self.journal.by(person).note(Kind.DISCONNECTED, None, turbine=connection.turbine.name)
         await connection.close()
+
+    def _slug_of(self, node: int) -> str | None:
+        targets = () if self.connection is None else self.connection.targets
+        return next((target.slug for target in targets if target.node == node), None)
 
     async def _keep(self, keeping: Awaitable[object]) -> None:
         """Keep something about the visit; a store that fails is told, and holds up no work at the turbine."""

@@ -36,6 +36,13 @@ class Kind(Enum):
     STORE_FAILED = "store_failed"
     STORE_BACK = "store_back"
     SETTINGS_CHANGED = "settings_changed"
+    FAULT_SET = "fault_set"
+    FAULT_SEEN = "fault_seen"
+    FAULT_CLEARED = "fault_cleared"
+    FAULT_ENDED = "fault_ended"
+    SCENARIO_STARTED = "scenario_started"
+    SCENARIO_STOPPED = "scenario_stopped"
+    SCENARIO_ENDED = "scenario_ended"
 
     @property
     def severity(self) -> Severity:
@@ -57,6 +64,9 @@ _WARNINGS: Final = (
     Kind.STOP_SENT,
     Kind.FEATHER_SENT,
     Kind.FOREIGN_WRITTEN,
+    Kind.FAULT_SET,
+    Kind.FAULT_SEEN,
+    Kind.SCENARIO_STARTED,
 )
 _DONE: Final = (
     Kind.CONNECTED,
@@ -69,6 +79,10 @@ _DONE: Final = (
     Kind.STOP_SENT,
     Kind.FEATHER_SENT,
     Kind.SETTINGS_CHANGED,
+    Kind.FAULT_SET,
+    Kind.FAULT_CLEARED,
+    Kind.SCENARIO_STARTED,
+    Kind.SCENARIO_STOPPED,
 )
 
 

@@ -13,6 +13,7 @@ from app import __version__
 from app.model.texts import load_texts
 from app.scene.hub import HubScene
 from app.service.bench import Bench
+from app.service.instructor import watched
 from app.service.jobs import Jobs
 from app.service.scene_feed import run_scene
 from app.web import problem
@@ -66,7 +67,7 @@ def create_api(bench: Bench | None, scene: HubScene | None = None, language: str
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         app.state.jobs = Jobs()
-        async with run_scene(bench, scene):
+        async with run_scene(bench, scene), watched(None if bench is None else bench.desk):
             yield
         await app.state.jobs.close()
 

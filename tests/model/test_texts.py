@@ -65,3 +65,9 @@ def test_a_missing_detail_is_a_dash_and_a_missing_key_is_seen() -> None:
     assert "–" in texts("error.limit", address="1")
     assert texts("no.such.key") == "no.such.key"
     assert load_texts("fr")("error.usage", reason="x") == "x", "other languages get English"
+
+
+def test_a_detail_that_is_a_key_is_told_in_words() -> None:
+    texts = load_texts("de")
+    told = texts("journal.fault_set", fault_key="fault.node_gone.name", target="wtg-07/blade-2/pmc")
+    assert told == "Fehler eingebracht: Knoten weg, wtg-07/blade-2/pmc"
