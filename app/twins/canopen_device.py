@@ -31,6 +31,8 @@ MS: Final = 1_000_000
 SECOND: Final = 1_000_000_000
 HEARTBEAT_LOST: Final = 0x8130
 """Emergency code: life guard or heartbeat error (CiA 301, table 26)."""
+WAS_BUS_OFF: Final = 0x8140
+"""Emergency code: recovered from bus off (CiA 301, table 26)."""
 _COMMUNICATION: Final = range(0x1000, 0x2000)
 _SYNC_PRODUCER: Final = 1 << 30
 _EXTENDED: Final = 1 << 29
@@ -72,11 +74,17 @@ class Application:
     def booted(self, t_ns: int) -> None:
         """The boot-up message was sent."""
 
+    def powered_off(self) -> None:
+        """The supply is gone; all that it drives falls off, at once."""
+
     def connection_lost(self, t_ns: int) -> None:
         """A watched heartbeat failed; the error itself is raised by ``communication_error``."""
 
     def communication_error(self, code: int) -> None:
         """Raise a communication error with the code of an emergency message."""
+
+    def memory_failed(self, t_ns: int) -> None:
+        """The memory could not be written."""
 
     def nmt_changed(self, state: NmtState, t_ns: int) -> None:
         """The node is now in ``state``."""
@@ -96,9 +104,12 @@ class CanopenDevice:
         self.state = NmtState.BOOT_UP
         self._mount = mount
         self._routes: dict[int, Callable[[Can, int], None]] = {}
+        self._own_routes: dict[int, Callable[[Can, int], None]] = {}
         self._powered_ns = 0
         self._boot_alarm = Alarm(line)
-        self._port = line.attach(self._on_frame)
+        self._port = self.port = line.attach(self._on_frame)
+        self.answer_delay_ns = 0
+        """How much later than usual SDO answers are sent."""
         self.store = ObjectStore(description, node_id, factory=mount.factory)
         self._give_identity(mount.identity)
         self.emergency = Emergency(self.store, self._send_emergency, self._uptime_s)
@@ -107,6 +118,7 @@ class CanopenDevice:
             None if mount.state_path is None else StateFile(mount.state_path, description.id),
             duration_ns=mount.save_ns,
             delivered=self._delivered(mount.delivered),
+            failed=lambda: self.application.memory_failed(self.line.now_ns),
         )
         # The client cannot go on before it has the answer, so the turnaround is not its time.
         self._sdo = SdoServer(self.store, line, self._answer, TIMEOUT_NS + mount.turnaround_ns)
@@ -127,11 +139,40 @@ class CanopenDevice:
         self.memory.keep()
         self._silence()
         self.power = Power.OFF
+        self.application.powered_off()
+
+    def cut_power(self) -> None:
+        """Lose the supply at this instant: what the memory's file does not hold is gone, a running save with it."""
+        self.memory.forget()
+        self._silence()
+        self.power = Power.OFF
+        self.application.powered_off()
+
+    def bus_off(self) -> None:
+        """The CAN controller takes itself off the bus (ISO 11898-1, 12.1.4); the device sees its connection lost."""
+        self.port.cut()
+        self.application.connection_lost(self.line.now_ns)
+
+    def bus_back(self) -> None:
+        """The CAN controller is back on the bus, and says so (CiA 301, table 26)."""
+        self.port.join()
+        if self.power is Power.ON:
+            self.application.communication_error(WAS_BUS_OFF)
 
     def poll(self, t_ns: int) -> None:
         """Let event-driven PDOs see what changed."""
         if self.state is NmtState.OPERATIONAL:
             self._pdo.poll(t_ns)
+
+    def listen(self, can_id: int, handler: Callable[[Can, int], None]) -> None:
+        """Receive frames of the maker's own, which CiA 301 does not know; none while the node is stopped."""
+        self._own_routes[can_id] = handler
+        self._route()
+
+    def send(self, can: Can) -> None:
+        """Send a frame of the maker's own; nothing while the node boots or is stopped (CiA 301, 7.3.2.2.4)."""
+        if self.power is Power.ON and self.state is not NmtState.STOPPED:
+            self._port.send(can)
 
     # -- boot and NMT (7.3.2) ------------------------------------------------------
 
@@ -213,6 +254,7 @@ class CanopenDevice:
         if self.state is NmtState.OPERATIONAL:
             routes.update(self._pdo.identifiers())
         if self.state in (NmtState.OPERATIONAL, NmtState.PRE_OPERATIONAL):
+            routes.update(self._own_routes)
             routes[self._sync_id()] = self._on_sync
             routes[sdo.REQUEST_BASE + self.node_id] = self._on_sdo
         for node in self._consumer.nodes:
@@ -250,7 +292,13 @@ class CanopenDevice:
         self.application.connection_lost(self.line.now_ns)
 
     def _answer(self, data: bytes, t_ns: int) -> None:
-        self._port.send(Can(sdo.RESPONSE_BASE + self.node_id, data), t_ns + self._mount.turnaround_ns)
+        late_ns = self._mount.turnaround_ns + self.answer_delay_ns
+        self._port.send(Can(sdo.RESPONSE_BASE + self.node_id, data), t_ns + late_ns)
+
+    def delay_answers(self, delay_ns: int) -> None:
+        """Have SDO answers leave ``delay_ns`` later than usual; what is asked for is done at once."""
+        self.answer_delay_ns = delay_ns
+        self._sdo.late_ns = delay_ns
 
     def _beat(self) -> None:
         self._port.send(Can(nmt.HEARTBEAT_BASE + self.node_id, nmt.heartbeat(self.state)))

@@ -13,6 +13,7 @@ collide (the one that asked first goes first), and no error frames arise.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -52,13 +53,39 @@ class TxOrder(Enum):
     FIFO = "fifo"
 
 
-@dataclass
-class Fault:
+class Interference(ABC):
+    """Something that happens to frames when they are sent; those that the line makes of them are exempt."""
+
+    @abstractmethod
+    def takes(self, port: Port, can: Can, ready_ns: int) -> bool:
+        """Look at a frame that ``port`` sends, ready at ``ready_ns``.
+
+        True: the frame is dealt with, and what is to become of it was given to ``Port.put``.
+        """
+
+    def ended(self) -> None:  # noqa: B027 - most have nothing to undo
+        """It was taken from the line: let go of what is held back."""
+
+
+@dataclass(eq=False)
+class Fault(Interference):
     """Something that happens to the next ``times`` frames sent for which ``matches`` holds (None: to all of them)."""
 
     matches: Callable[[Can], bool]
     action: FaultAction
     times: int | None = 1
+
+    def takes(self, port: Port, can: Can, ready_ns: int) -> bool:
+        """Do the action, once less from now on."""
+        if self.times == 0 or not self.matches(can):
+            return False
+        if self.times is not None:
+            self.times -= 1
+            if self.times == 0:
+                port.line.withdraw(self)
+        for delay_ns, other in self.action(can):
+            port.put(other, ready_ns + delay_ns)
+        return True
 
 
 def drop(_can: Can) -> Sequence[tuple[int, Can]]:
@@ -94,15 +121,18 @@ class _Pending:
 class Port:
     """A node's place on the line. Made by ``CanLine.attach``."""
 
-    __slots__ = ("_line", "_queue", "attached", "epoch", "handler", "identifiers", "order", "pending")
+    __slots__ = ("_cuts", "_queue", "attached", "epoch", "handler", "identifiers", "line", "live", "order", "pending")
 
     def __init__(self, line: CanLine, handler: Handler, identifiers: frozenset[int] | None, order: TxOrder) -> None:
-        self._line = line
+        self.line = line
         self._queue: deque[_Pending] = deque()
+        self._cuts = 0
         self.handler = handler
         self.identifiers = identifiers
         self.order = order
         self.attached = True
+        self.live = True
+        """Whether it sends and hears: attached, and not cut off."""
         self.epoch = 0
         self.pending = 0
         """Frames that wait for the line."""
@@ -112,12 +142,35 @@ class Port:
 
         Raises ValueError where the frame cannot exist on a classic CAN bus.
         """
-        self._line._send(self, can, not_before_ns)
+        self.line._send(self, can, not_before_ns)
+
+    def put(self, can: Can, not_before_ns: int = 0) -> None:
+        """Queue ``can`` as ``send`` does, whatever interferes: nothing happens to it on its way."""
+        if self.live:
+            self.line._queue(self, can, not_before_ns)
 
     def accept(self, identifiers: Iterable[int] | None) -> None:
         """Set the acceptance filter: base identifiers only, extended frames fail it; None accepts every frame."""
         self.identifiers = None if identifiers is None else frozenset(identifiers)
-        self._line._receivers.clear()
+        self.line._receivers.clear()
+
+    def cut(self) -> None:
+        """Cut the node off: what waits is lost, and so is all that it sends; it hears nothing. Cuts add up.
+
+        A frame on the line ends normally.
+        """
+        self._cuts += 1
+        self._connect()
+        self.clear()
+
+    def join(self) -> None:
+        """End one cut."""
+        self._cuts -= 1
+        self._connect()
+
+    def _connect(self) -> None:
+        self.live = self.attached and self._cuts == 0
+        self.line._receivers.clear()
 
     def clear(self) -> None:
         """Forget all frames that wait, as a controller does that is reset. A frame on the line ends normally."""
@@ -128,7 +181,8 @@ class Port:
     def detach(self) -> None:
         """Leave the line."""
         self.clear()
-        self._line._detach(self)
+        self.live = False
+        self.line._detach(self)
 
     def enqueue(self, entry: _Pending) -> _Pending | None:
         """Take ``entry`` in; gives what may join arbitration now, if anything."""
@@ -182,7 +236,7 @@ class CanLine:
         self._ports: list[Port] = []
         self._receivers: dict[int, tuple[Port, ...]] = {}
         self._taps: list[Tap] = []
-        self._faults: list[Fault] = []
+        self._interferences: list[Interference] = []
 
     # -- for nodes -------------------------------------------------------------
 
@@ -216,15 +270,26 @@ class CanLine:
 
     def tap(self, tap: Tap) -> None:
         """Have ``tap`` called for every frame, before the nodes receive it."""
-        self._taps.append(tap)
+        self._taps = [*self._taps, tap]  # a new list: one may be ringing
 
-    def inject(self, fault: Fault) -> None:
-        """Have ``fault`` happen to frames sent from now on; the first fault that matches acts."""
-        self._faults.append(fault)
+    def untap(self, tap: Tap) -> None:
+        """End what ``tap`` began."""
+        self._taps = [one for one in self._taps if one != tap]
+
+    def inject(self, fault: Interference) -> None:
+        """Have ``fault`` happen to frames sent from now on; the first that takes a frame acts."""
+        self._interferences.append(fault)
+
+    def withdraw(self, fault: Interference) -> None:
+        """End ``fault``, where it has not ended."""
+        if fault in self._interferences:
+            self._interferences.remove(fault)
+            fault.ended()
 
     def clear_faults(self) -> None:
-        """Forget all faults."""
-        self._faults.clear()
+        """End all faults."""
+        for fault in tuple(self._interferences):
+            self.withdraw(fault)
 
     # -- time --------------------------------------------------------------------
 
@@ -271,17 +336,13 @@ class CanLine:
         return bits * _NS // self.bitrate
 
     def _send(self, port: Port, can: Can, not_before_ns: int) -> None:
-        if not port.attached:
+        if not port.live:
             return
-        for fault in self._faults:
-            if fault.matches(can):
-                if fault.times is not None:
-                    fault.times -= 1
-                    if fault.times <= 0:
-                        self._faults.remove(fault)
-                for delay_ns, other in fault.action(can):
-                    self._queue(port, other, max(not_before_ns, self.now_ns) + delay_ns)
-                return
+        if self._interferences:
+            ready_ns = max(not_before_ns, self.now_ns)
+            for fault in tuple(self._interferences):
+                if fault.takes(port, can, ready_ns):
+                    return
         self._queue(port, can, not_before_ns)
 
     def _queue(self, port: Port, can: Can, ready_ns: int) -> None:
@@ -338,13 +399,15 @@ class CanLine:
         if receivers is None:
             receivers = self._find_receivers(can)
         for port in receivers:
-            if port is not sender and port.attached:
+            if port is not sender and port.live:
                 self._guarded(port.handler, can, t_ns)
 
     def _find_receivers(self, can: Can) -> tuple[Port, ...]:
         if can.extended:
-            return tuple(port for port in self._ports if port.identifiers is None)
-        found = tuple(port for port in self._ports if port.identifiers is None or can.can_id in port.identifiers)
+            return tuple(port for port in self._ports if port.live and port.identifiers is None)
+        found = tuple(
+            port for port in self._ports if port.live and (port.identifiers is None or can.can_id in port.identifiers)
+        )
         self._receivers[can.can_id] = found
         return found
 

@@ -28,6 +28,7 @@ class NonVolatile:
     """The memory of one device and the objects that command it.
 
     ``delivered`` is what the memory holds when there is no file yet. ``duration_ns`` is how long a save takes.
+    ``failed`` is called when it could not be written.
     """
 
     def __init__(
@@ -37,10 +38,16 @@ class NonVolatile:
         *,
         duration_ns: int,
         delivered: dict[Address, bytes],
+        failed: Callable[[], None] = lambda: None,
     ) -> None:
         self._store = store
         self._file = file
         self._duration_ns = duration_ns
+        self._failed = failed
+        self.slow_ns: int | None = None
+        """How long a save takes while the memory is slow; None: it is not."""
+        self.failing = False
+        """Whether the memory takes nothing."""
         loaded = None if file is None else file.load()
         self.problem = None if loaded is None else loaded.problem
         if loaded is not None and loaded.memory is not None:
@@ -76,11 +83,16 @@ class NonVolatile:
         now = {cell.entry.address: cell.to_bytes() for cell in self._remanent}
         if now == self.memory.remanent:
             return
-        self.memory.remanent = now
         try:
-            self._write()
+            self._write(Memory(self.memory.saved, now))
         except OSError as error:
-            self._report(str(error))
+            if self._report(str(error)):
+                self._failed()
+
+    def forget(self) -> None:
+        """Power is gone at this instant: of the remanent values, those that were written remain."""
+        kept = {cell.entry.address for cell in self._remanent}
+        self._store.restore(lambda entry: entry.address in kept, self.memory.remanent)
 
     def _drop_unknown(self) -> None:
         """Leave out what the file holds of objects that the description does not have, or has in another size."""
@@ -105,39 +117,47 @@ class NonVolatile:
 
     def _effect(self, act: Callable[[Callable[[Entry], bool]], None], wanted: Callable[[Entry], bool]) -> Effect:
         def start(_raw: Raw) -> Deferred:
-            return Deferred(self._duration_ns, lambda _now_ns: act(wanted))
+            duration_ns = self._duration_ns if self.slow_ns is None else self.slow_ns
+            return Deferred(duration_ns, lambda _now_ns: act(wanted))
 
         return start
 
     def _save(self, wanted: Callable[[Entry], bool]) -> None:
+        saved = dict(self.memory.saved)
         for cell in self._store:
             entry = cell.entry
             # A live value (a measured temperature in a saved record) and a mirror are no parameters to keep.
             if entry.saved and cell.source is None and _is_parameter(entry) and wanted(entry):
-                self.memory.saved[entry.address] = encode_raw(entry.type, cell.raw)
-        self._commit()
+                saved[entry.address] = encode_raw(entry.type, cell.raw)
+        self._commit(saved)
 
     def _load(self, wanted: Callable[[Entry], bool]) -> None:
-        for address in list(self.memory.saved):
-            if wanted(self._store.at(address).entry):
-                del self.memory.saved[address]
-        self._commit()
+        saved = self.memory.saved.items()
+        self._commit({address: data for address, data in saved if not wanted(self._store.at(address).entry)})
 
-    def _commit(self) -> None:
-        self.memory.remanent = {cell.entry.address: cell.to_bytes() for cell in self._remanent}
+    def _commit(self, saved: dict[Address, bytes]) -> None:
         try:
-            self._write()
+            self._write(Memory(saved, {cell.entry.address: cell.to_bytes() for cell in self._remanent}))
         except OSError as error:
             self._report(str(error))
+            self._failed()
             raise RefusedAccessError(Abort.HARDWARE) from error
 
-    def _report(self, problem: str) -> None:
+    def _report(self, problem: str) -> bool:
+        """Tell a problem once; gives whether it is another one than before."""
+        if problem == self.problem:
+            return False
         self.problem = problem
         _LOG.warning("twin's memory: %s", problem)
+        return True
 
-    def _write(self) -> None:
+    def _write(self, memory: Memory) -> None:
+        """Replace the memory, or leave it as it is and raise OSError."""
+        if self.failing:
+            raise OSError("the memory takes nothing")
         if self._file is not None:
-            self._file.store(self.memory)
+            self._file.store(memory)
+        self.memory = memory
 
 
 def _is_parameter(entry: Entry) -> bool:

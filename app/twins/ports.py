@@ -28,6 +28,12 @@ class Port(Protocol):
     def clear(self) -> None:
         """Forget the frames that wait."""
 
+    def cut(self) -> None:
+        """Cut the node off the line: it neither sends nor hears. Cuts add up."""
+
+    def join(self) -> None:
+        """End one cut."""
+
 
 class Line(Protocol):
     """A simulated bus with its clock. ``bitrate`` in bit/s."""

@@ -87,6 +87,8 @@ class SdoServer:
         # Between two frames that count there may be a block of segments, ours or ones to be repeated.
         block_bits = sdo_block.MAX_BLOCK * _LONGEST_FRAME_BITS
         self._timeout_ns = timeout_ns + block_bits * 1_000_000_000 // line.bitrate
+        self.late_ns = 0
+        """How much later than usual its answers reach the line: the client has as much more time."""
         self._busy = False
         self._waiting: deque[bytes] = deque(maxlen=_WAITING_LIMIT)
 
@@ -120,7 +122,7 @@ class SdoServer:
         if self._transfer is None:
             self._silence.clear()
         else:
-            self._silence.set(t_ns + self._timeout_ns, self._timed_out)
+            self._silence.set(t_ns + self._timeout_ns + self.late_ns, self._timed_out)
 
     def _timed_out(self, t_ns: int) -> None:
         transfer, self._transfer = self._transfer, None
