@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from enum import IntFlag
 from typing import Final
 
 from app.model.address import Address
 from app.model.datatypes import Raw
-from app.twins.canopen_device import MS, SECOND, Application, CanopenDevice
+from app.twins.canopen_device import MS, SECOND, Application, CanopenDevice, Power
+from app.twins.manual_function import KEY, ManualFunction
 from app.twins.object_store import RefusedAccessError
 from app.twins.plant_power import PowerPlant
 from app.twins.pmm_battery import BatteryTest, Charger
 from app.twins.pmm_errors import PmmErrors
+from app.twins.pmm_io import AlarmInputs, PmmInputs, PmmOutputs
 from app.twins.pmm_temperature import PLACES, SENSOR_OPEN, SENSOR_SHORT, SensorState, TemperatureWatch
+from app.twins.unit_link import AxisFlag, AxisReport, SupplyFlag, SupplyReport, UnitLink
 from app.wire.nmt import NmtState
 from app.wire.sdo import Abort
 
@@ -35,19 +37,13 @@ _SUPPLY_MOST_MA: Final = 8000
 _SUPPLY_LOW_MV: Final = 18000
 _SUPPLY_HIGH_MV: Final = 28000
 """Table 15, bits 4 to 6."""
-_ANALOG_STEP_MV: Final = 10000 / 1023
-"""30A0h: 10 bits over 0 to 10 V."""
 _ONLY_TYPE: Final = 0xA1
 """Battery type that the PMM supports (4.3.1.1)."""
 _LEAST_TEST_MIN: Final = 60
-_ALARM_INPUTS: Final = 0x3FFF
-_ALARM_FAULT: Final = 1 << 14
-_ALARM_HIGH: Final = 1 << 15
-_SAFETY_CHAIN: Final = 1 << 16
-_LED_STATUS, _LED_FAULT, _LED_WATCHDOG, _LED_BUS = 1 << 24, 1 << 25, 1 << 26, 1 << 27
-_MANUAL_BY_OBJECT: Final = 1 << 5
 _BATTERY_CODES: Final = frozenset(range(0x3280, 0x3290))
 _REMANENT: Final = (0x3050, 0x3051, 0x3052)
+LINK_BROKEN: Final = 0x3221
+"""Table 6 gives it to the PMM only."""
 
 
 class PmmControl(IntFlag):
@@ -59,38 +55,31 @@ class PmmControl(IntFlag):
     RESET = 1 << 7
 
 
-@dataclass(slots=True)
-class PmmInputs:
-    """Levels at the clamps as bits of 30FDh (table 34), and the sensors.
-
-    Healthy: EFC, "EFC direct" and the 24 V feed-ins present, lightning protection in order.
-    """
-
-    digital: int = 1 << 0 | 1 << 2 | 1 << 3 | 1 << 4 | 1 << 9 | 1 << 12 | 1 << 20
-    analog_mv: float = 4900.0
-    selector: int = 0
-    """Selector switch for manual functions, 0..15."""
-    key: bool = False
-    """Key button of the manual functions."""
-    sensors: list[SensorState] = field(default_factory=lambda: [SensorState.FITTED, SensorState.FITTED])
-
-
 class OatPmm(Application):
-    """The PMM on a device. ``tick`` moves it on. ``axis_moves`` tells whether the motor runs."""
+    """The PMM on a device. ``tick`` moves it on. ``axis_moves`` tells whether the motor runs.
+
+    ``feeds``: the devices that its supply feeds, itself among them; it switches them off when the time to power down
+    is over, and on again with the mains.
+    """
 
     def __init__(self, device: CanopenDevice, power: PowerPlant, axis_moves: Callable[[], bool]) -> None:
         device.application = self
         self.device = device
         self.power = power
-        self.inputs = PmmInputs()
+        self.inputs = PmmInputs(lambda: device.line.now_ns)
+        self.feeds: tuple[CanopenDevice, ...] = (device,)
+        self.link: UnitLink[AxisReport] | None = None
         self._axis_moves = axis_moves
         self._store = device.store
         self.errors = PmmErrors(device.emergency)
         self.charger = Charger(self._store, power)
         self.test = BatteryTest(self._store, power)
         self._watches = tuple(TemperatureWatch(self._store, self.errors, place) for place in PLACES)
-        self._booted = False
-        self._controlword = self._manual = 0
+        self.outputs = PmmOutputs(self._store, self.errors)
+        self.alarms = AlarmInputs(self._store, self.errors)
+        self.manual = ManualFunction(self._store, self._operated, self.errors.reset)
+        self._booted = self._slept = False
+        self._controlword = 0
         self._boost_until_ns = 0
         self._failed_since_ns: int | None = None
         self._last_ns = self._slow_ns = self._keep_ns = 0
@@ -104,8 +93,11 @@ class OatPmm(Application):
 
     def restarted(self, t_ns: int) -> None:
         """Power-on or restart; the battery stays as it is."""
-        self._booted = False
-        self._controlword = self._manual = 0
+        self._booted = self._slept = False
+        self._controlword = 0
+        self.manual.clear()
+        if self.link is not None:
+            self.link.stop()
         self._boost_until_ns = t_ns
         self._failed_since_ns = None
         self._chopper_mean_w = 0.0
@@ -121,11 +113,81 @@ class OatPmm(Application):
     def booted(self, t_ns: int) -> None:
         """It works by itself from now on."""
         self._booted = True
+        self.inputs.restart(t_ns)
         self._slow(t_ns)
+        if self.link is not None:
+            self.link.start(t_ns)
+
+    def powered_off(self) -> None:
+        """Nothing is controlled; outputs and safety relay have fallen off."""
+        self._booted = False
+        self.power.commands.booster_target_v = None
+        self.power.commands.chopper_on = False
+        self.power.commands.charge_a = 0.0
+        if self.link is not None:
+            self.link.stop()
 
     def communication_error(self, code: int) -> None:
         """8130h and its like."""
         self.errors.event(code)
+
+    # -- safety chain, link to the PMC, supply of both units --------------------------------
+
+    def join(self, peer: int) -> None:
+        """Talk with the PMC on node ``peer``."""
+        self.link = UnitLink(self.device, peer, self._report, AxisReport.from_bytes, self._link_changed)
+
+    @property
+    def axis(self) -> AxisReport | None:
+        """What the PMC said last; None where it is not known."""
+        return None if self.link is None else self.link.data
+
+    @property
+    def safety_relay(self) -> bool:
+        """The contact in the safety chain (X13.11, X13.12; 30FEh/3 bit 16): open with an error, and without a supply.
+
+        It opens too where the mains stays away for longer than 30E0h: the emergency mode begins.
+        """
+        return self.running and not self.errors.pending and self._hold_up_ms > 0
+
+    @property
+    def lets_axis_run(self) -> bool:
+        """Level that it gives to X2.3 of its PMC: 0 executes the EFC. A PMM that does not run gives 0."""
+        return self.running and not self.inputs.feathers
+
+    @property
+    def running(self) -> bool:
+        """It is supplied and has booted."""
+        return self._booted and self.device.power is not Power.OFF
+
+    @property
+    def _hold_up_ms(self) -> int:
+        """30B2h; a 30E0h of 0 bridges nothing, and harms nobody while the mains is there."""
+        if self._failed_since_ns is None:
+            return max(1, self._store.number(0x30E0))
+        return self._remaining_ms(self._store.number(0x30E0))
+
+    def _report(self) -> SupplyReport:
+        flags = SupplyFlag.FAULT if self.errors.pending else SupplyFlag.NONE
+        if self._failed_since_ns is not None:
+            flags |= SupplyFlag.MAINS_FAILED
+        return SupplyReport(self.manual.word, flags)
+
+    def _link_changed(self, broken: bool) -> None:
+        self.errors.error(LINK_BROKEN, broken)
+
+    def _shut_down(self) -> None:
+        """30B3h is over: both units fall silent, what is left in the battery stays there."""
+        self._slept = True
+        for device in self.feeds:
+            device.power_off()
+
+    def _wake(self, t_ns: int) -> None:
+        """The mains is back after a shut-down."""
+        if self.power.mains_now_v >= self.power.constants.mains_v * _MAINS_LOW_SHARE:
+            self._slept = False
+            for device in self.feeds:
+                device.power_on(t_ns)
 
     # -- time -----------------------------------------------------------------------------
 
@@ -133,9 +195,14 @@ class OatPmm(Application):
         """Watch voltages, decide on booster and chopper; every 100 ms on all else."""
         dt_s = (t_ns - self._last_ns) / SECOND
         self._last_ns = t_ns
+        if self._slept:
+            self._wake(t_ns)
         if not self._booted:
             return
         self._watch_mains(t_ns)
+        if self._failed_since_ns is not None and self._remaining_ms(self._store.number(0x30E1) * 1000) == 0:
+            self._shut_down()
+            return
         self._control_booster(t_ns)
         self._control_chopper(dt_s)
         self._watch_voltages()
@@ -154,7 +221,7 @@ class OatPmm(Application):
         self.test.step(dt_s, moves)
         for place, watch in enumerate(self._watches):
             watch.step(self._temperature(place), self._sensor(place), dt_s)
-        self._watch_alarm_inputs()
+        self.alarms.watch(self.inputs.settled)
 
     # -- mains, DC link, booster, chopper ----------------------------------------------------
 
@@ -235,41 +302,19 @@ class OatPmm(Application):
             return SENSOR_OPEN
         return round(self.power.sensor_c(number) * 10)
 
-    def _watch_alarm_inputs(self) -> None:
-        """3300h/n raises FFFnh; 0 selects no input. OPEN how several inputs join: one that alarms is enough."""
-        for number in range(1, 9):
-            mask = self._store.number(0x3300, number)
-            levels = self.inputs.digital if mask & _ALARM_HIGH else ~self.inputs.digital
-            alarm = bool(levels & mask & _ALARM_INPUTS)
-            self.errors.error(0xFFF0 | number, alarm and bool(mask & _ALARM_FAULT))
-            self.errors.warning(0xFFF0 | number, alarm and not mask & _ALARM_FAULT)
-
     def _outputs(self) -> int:
-        """30FEh/3: by mask from 30FEh/1, else from the functions; from bit 16 on the unit's own."""
+        """30FEh/3: what is programmed, what the functions set, and from bit 16 on the unit's own."""
         functions = 0
         for watch in self._watches:
             functions |= watch.outputs
-        if self.errors.pending:
-            functions |= self._store.number(0x30FF, 1)
-        if self.errors.warnings:
-            functions |= self._store.number(0x30FF, 2)
-        mask = self._store.number(0x30FE, 2)
-        outputs = (functions & ~mask | self._store.number(0x30FE, 1) & mask) & 0xFFFF
-        if self._booted and not self.errors.pending:
-            outputs |= _SAFETY_CHAIN | _LED_WATCHDOG
-        outputs |= _LED_FAULT if self.errors.pending else 0
-        outputs |= _LED_STATUS if self._booted else 0
-        return outputs | (_LED_BUS if self.device.state is NmtState.OPERATIONAL else 0)
+        axis = self.axis
+        known = axis is not None and AxisFlag.POSITION_VALID in axis.flags
+        own = self.outputs.own(self.safety_relay, self.running, self.device.state is NmtState.OPERATIONAL)
+        return self.outputs.word(functions, axis.position_cdeg if axis is not None and known else None, own)
 
-    def _digital_inputs(self) -> int:
-        """30FDh (table 34): clamps, push-button in bit 27, selector switch from bit 28 on."""
-        return self.inputs.digital | self.inputs.key << 27 | (self.inputs.selector & 0x0F) << 28
-
-    def _manual_out(self) -> int:
-        """5042h: from 5040h where its bit 5 is set, else from selector switch and key button (3.3.1)."""
-        if self._manual & _MANUAL_BY_OBJECT:
-            return self._manual & 0x1F
-        return (self.inputs.selector & 0x0F) | self.inputs.key << 4
+    def _operated(self) -> int:
+        """Selector switch and key button as bits of table 8."""
+        return (self.inputs.selector & 0x0F) | (KEY if self.inputs.key else 0)
 
     # -- status objects ---------------------------------------------------------------------------
 
@@ -317,6 +362,7 @@ class OatPmm(Application):
         power, charger, store = self.power, self.charger, self._store
         capacity = store.cell(0x3020, 2)
         nominal = store.cell(0x3020, 8)
+        pulse = store.cell(0x30E2)
         sources: dict[int, Callable[[], Raw]] = {
             0x3000: self._pmm_status,
             0x3001: lambda: charger.status,
@@ -347,15 +393,13 @@ class OatPmm(Application):
             0x3080: lambda: round(power.charge * 100),
             # Of a new cell's resistance to the measured one.
             0x3081: lambda: min(100, round(100 * nominal.number / max(power.battery_ohm * 1000, 1))),
-            0x30A0: lambda: round(round(self.inputs.analog_mv / _ANALOG_STEP_MV) * _ANALOG_STEP_MV),
+            0x30A0: lambda: self.inputs.analog_read_mv,
             0x30B0: lambda: round(min(100.0, power.booster_a / max(power.commands.booster_limit_a, 1.0) * 100)),
             0x30B1: lambda: round(min(100.0, self._chopper_mean_w / _CHOPPER_FULL_W * 100)),
             0x30B2: lambda: self._remaining_ms(store.number(0x30E0)),
             0x30B3: lambda: -(-self._remaining_ms(store.number(0x30E1) * 1000) // 1000),
             0x30B4: lambda: round(power.battery_ohm * 1000),
-            0x30FD: self._digital_inputs,
-            0x5041: lambda: self._manual_out() & 0x0F,
-            0x5042: self._manual_out,
+            0x30FD: lambda: self.inputs.word(pulse.number),
             0x603F: lambda: self.errors.code,
         }
         for index, source in sources.items():
@@ -381,7 +425,6 @@ class OatPmm(Application):
 
     def _bind_commands(self) -> None:
         self._store.cell(0x3040).effect = self._on_controlword
-        self._store.cell(0x5040).effect = self._on_manual_control
         self._store.cell(0x30E3).guard = _check_test_cycle
         self._store.cell(0x3020, 1).guard = _check_battery_type
 
@@ -403,12 +446,6 @@ class OatPmm(Application):
         elif falling & PmmControl.BOOST:
             self._boost_until_ns = now_ns
         self._control_booster(now_ns)
-
-    def _on_manual_control(self, raw: Raw) -> None:
-        """Bit 7 of 5040h rising resets errors (table 8)."""
-        before, self._manual = self._manual, raw if isinstance(raw, int) else 0
-        if self._manual & ~before & 0x80:
-            self.errors.reset()
 
 
 def _check_test_cycle(raw: Raw) -> None:

@@ -372,7 +372,7 @@ def test_analog_input_has_10_bits(rig: BladeRig, get: Get) -> None:
 @pytest.mark.rule("I13")
 def test_manual_function_by_switch_or_by_object(rig: BladeRig, get: Get) -> None:
     rig.pmm.inputs.selector, rig.pmm.inputs.key = 3, True
-    assert (get("5042"), get("5041")) == (0x13, 3)
+    assert (get("5042"), get("5041")) == (0x13, 0x13)
     assert get("30FD") >> 27 == 0b00111
     rig.put("5040", 0x05, PMM)
     assert get("5042") == 0x13
