@@ -1,19 +1,29 @@
-"""Physics of one blade's supply: mains, DC link, chopper, booster, battery of blocs, 24 V, temperatures. SI units.
+"""One blade's supply: mains, DC link, chopper, booster, battery of blocs, 24 V, temperatures. SI units.
 
-No protocol and no clock: ``step`` moves it on by ``dt_s``. A plain model; what a controller decides (booster, charger,
-chopper) is set from outside.
+No protocol and no clock. What is fast runs in cycles of 1 ms in ``supply_kernel``; ``prepare`` hands it commands and
+slow values, ``settle`` takes over what it counted: charge and age of the blocs, temperatures, swing of the mains. The
+slow part rests on the number of cycles alone, so that it is the same however time is cut into calls.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from itertools import pairwise
-from math import exp, pi, sin, sqrt
+from math import exp, pi, sin
 from random import Random
 from typing import Final
 
-BLOCS: Final = 6
-"""Battery blocs in series (manual, 3020h/4)."""
+from app.twins import supply_kernel as k
+from app.twins.axis_kernel import COPPER_J, INVERTER_J
+from app.twins.plant_battery import BLOCS, Bloc, in_series_ohm, in_series_v, open_circuit_v
+from app.twins.plant_mains import Mains
+from app.twins.plant_thermal import Losses, ThermalPlant
+
+__all__ = ["BLOCS", "Bloc", "PowerCommands", "PowerConstants", "PowerPlant", "open_circuit_v"]
+
+STATE_LENGTH: Final = 160
+"""Places of the state and of the parameters, those of the axis included."""
+_SLOW_CYCLES: Final = 100
+"""Slow values move on every 100 ms."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,104 +35,105 @@ class PowerConstants:
     mains_swing_v: float = 3.0
     mains_period_s: float = 47.0
     """Slow swing of a turbine's auxiliary supply (estimate)."""
+    line_ohm: float = 0.5
+    """Of two lines, slip rings and rectifier in series: 2 % of the voltage at rated power (estimate, usual layout)."""
     capacity_f: float = 0.003
     """DC link capacitor of a 9 kW drive (typical, 330 uF per kW)."""
-    rectifier_s: float = 0.005
-    """Time constant of charging the DC link from the mains: the capacitor over about 1.7 ohm of line and rectifier, so
-    that a healthy mains holds the link within some 20 V while all of the motor's power is drawn (estimate)."""
-    idle_load_w: float = 60.0
-    """Electronics and 24 V adapters (estimate)."""
+    idle_load_w: float = 30.0
+    """Electronics and discharge resistors on the DC link (estimate: 20 kOhm take 16 W at 565 V)."""
+    lockout_v: float = 100.0
+    """Where the electronics' converters stop (typical: a fifth of the nominal DC link)."""
+    adapter_efficiency: float = 0.85
+    """Of the 24 V adapter (typical for 50 W)."""
+    charger_efficiency: float = 0.90
+    """Of the charger's two stages (typical for 250 W)."""
     chopper_ohm: float = 100.0
-    """Brake resistor: 4.5 kW at 670 V for short (estimate)."""
-    bloc_capacity_as: float = 3.0 * 3600
-    """3000 mAh (manual, 3020h/2)."""
+    """Brake resistor: 4.5 kW at 670 V for short, 300 W for ever (estimate; manual, 30B1h: 100 % = 300 W)."""
+    booster_efficiency: float = 0.93
+    """From 240 V to 600 V at some kW (typical for a hard-switched booster)."""
+    booster_loop_s: float = 0.02
+    """Time constant of its voltage controller (estimate; 30FBh/1 and /2 have no printed unit)."""
     battery_ohm: float = 0.150
     """All blocs, new (manual, 3020h/8)."""
     lead_ohm: float = 0.100
     """Battery leads (manual, 3020h/7)."""
+    polarisation_share: float = 0.4
+    """Slow part of the internal resistance, of the quick one (typical for lithium ion)."""
+    polarisation_s: float = 20.0
+    """Its time constant (typical for lithium ion: 10 to 60 s)."""
+    bloc_capacity_as: float = 3.0 * 3600
+    """3000 mAh (manual, 3020h/2)."""
     supply_v: float = 24.3
+    supply_ohm: float = 0.1
+    """Internal 24 V supply and what it gives way by (estimate)."""
     supply_a: float = 0.85
-    """24 V output and own consumption without the brake (estimate, below the 1 A of 30C0h)."""
+    """Own consumption without the brake (estimate, below the 1 A of 30C0h)."""
     brake_a: float = 0.75
-    """Coil of the lifted holding brake (estimate)."""
-    heat_sink_k_per_w: float = 0.08
-    heat_sink_s: float = 400.0
-    motor_k_per_w: float = 0.09
-    motor_s: float = 1500.0
-    """Thermal resistances and time constants (estimate)."""
-    motor_loss_share: float = 0.13
-    """Of the power the motor takes (efficiency 0.87, as in the axis' rated torque)."""
+    """Coil of the lifted holding brake (estimate: 18 W at 24 V)."""
+    fan_a: float = 0.06
+    """Each fan that runs (estimate: 1.5 W)."""
+    diode_v: float = 0.7
+    """Between the external 24 V and the rail (manual, 4.2.3.1)."""
+    iron_loss_share: float = 0.03
+    """Of what passes the inverter, lost in the motor beside its windings (typical for its class)."""
     ambient_swing_c: float = 0.4
     ambient_period_s: float = 900.0
     """Slow change of the temperature in the hub (estimate)."""
-    battery_settle_s: float = 3600.0
-    loss_share: float = 0.04
-    """Losses of output stage and rectifier, of the power that passes (estimate)."""
-
-
-_OPEN_CIRCUIT_V: Final = ((0.0, 31.0), (0.1, 34.2), (0.5, 36.4), (0.9, 39.4), (1.0, 41.0))
-"""Bloc voltage without load over the state of charge; lithium, 36 V nominal, 41 V at most (manual, 3020h/5 and /6)."""
-
-
-def open_circuit_v(charge: float) -> float:
-    """Voltage of one bloc without load at a state of charge of 0..1."""
-    for (low, low_v), (high, high_v) in pairwise(_OPEN_CIRCUIT_V):
-        if charge <= high:
-            return low_v + (max(charge, low) - low) / (high - low) * (high_v - low_v)
-    return _OPEN_CIRCUIT_V[-1][1]
-
-
-@dataclass(slots=True)
-class Bloc:
-    """One bloc of the battery: its state of charge and what is its own."""
-
-    charge: float
-    offset_v: float
-    temperature_c: float
-    warmer_c: float
 
 
 @dataclass(slots=True)
 class PowerCommands:
-    """What the controllers of the PMM have decided."""
+    """What the controllers of the PMM have decided. Thresholds in V and A; the kernel acts on them in its cycle."""
 
+    enabled: bool = True
+    """The unit works: booster, chopper and charger may."""
+    mains_failed: bool = False
+    booster_on: bool = False
+    """By command or for a test, whatever the mains does."""
+    booster_start_v: float = 420.0
     booster_target_v: float | None = None
-    """Voltage to which the booster regulates the DC link; None: off."""
     booster_limit_a: float = 90.0
+    battery_least_v: float = 162.0
     chopper_on: bool = False
+    """For a test, whatever the voltage is."""
+    chopper_on_v: float = 670.0
+    chopper_off_v: float = 650.0
     charge_a: float = 0.0
     """Charge current into the battery."""
 
 
 @dataclass(slots=True)
 class PowerPlant:
-    """State of one supply. ``seed`` makes the units differ, always in the same way."""
+    """State of one supply. ``seed`` makes the units differ, always in the same way.
+
+    ``s`` and ``p`` are the vectors of ``supply_kernel``; a blade shares them with its axis.
+    """
 
     seed: int = 0
     constants: PowerConstants = field(default_factory=PowerConstants)
-    mains_present: bool = True
-    mains_factor: float = 1.0
+    s: list[float] = field(default_factory=lambda: [0.0] * STATE_LENGTH, repr=False)
+    p: list[float] = field(default_factory=lambda: [0.0] * STATE_LENGTH, repr=False)
     ambient_c: float = 22.0
     commands: PowerCommands = field(default_factory=PowerCommands)
-    motor_power_w: float = 0.0
     brake_lifted: bool = False
-    dc_link_v: float = 0.0
-    battery_a: float = 0.0
-    booster_a: float = 0.0
-    booster_limited: bool = False
-    chopper_w: float = 0.0
-    heat_sink_c: float = 0.0
-    motor_c: float = 0.0
-    sensor_warmer_c: list[float] = field(default_factory=list)
+    external_v: float | None = None
+    """External 24 V feed-in at its clamp; None: not fitted."""
+    extra_supply_a: float = 0.0
+    """What else hangs on the 24 V."""
+    supply_drop_v: float = 0.0
+    """What is wrong with the internal 24 V."""
     blocs: list[Bloc] = field(default_factory=list)
-    battery_ohm: float = 0.0
-    """Internal resistance of all blocs, as it has become."""
-    _age_s: float = 0.0
+    mains: Mains = field(init=False)
+    thermal: ThermalPlant = field(default_factory=ThermalPlant)
     _phase: float = 0.0
+    _slow_cycle: float = 0.0
+    _booked: tuple[float, ...] = (0.0,) * 6
+    _table: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         """Begin warm and charged, slightly different for each seed."""
         random = Random(self.seed)
+        constants = self.constants
         self._phase = random.uniform(0.0, 2 * pi)
         self.ambient_c += random.uniform(-1.5, 1.5)
         charge = random.uniform(0.955, 0.985)
@@ -130,121 +141,321 @@ class PowerPlant:
             Bloc(charge + random.uniform(-0.004, 0.004), random.uniform(-0.03, 0.03), 0.0, random.uniform(1.0, 2.6))
             for _ in range(BLOCS)
         ]
-        self.battery_ohm = self.constants.battery_ohm * random.uniform(1.0, 1.08)
+        ohm = constants.battery_ohm * random.uniform(1.0, 1.08)
+        thermal = self.thermal
+        thermal.box_c = thermal.heat_sink_c = self.ambient_c
         for bloc in self.blocs:
             bloc.temperature_c = self.ambient_c + bloc.warmer_c
-        self.heat_sink_c = self.ambient_c + self.constants.heat_sink_k_per_w * self.constants.idle_load_w
-        self.motor_c = self.ambient_c + random.uniform(0.0, 2.0)
-        self.sensor_warmer_c = [random.uniform(2.0, 5.0), random.uniform(1.0, 3.0)]
-        self.dc_link_v = self.mains_now_v * sqrt(2)
+            bloc.new_ohm, bloc.capacity_as = ohm / BLOCS, constants.bloc_capacity_as
+        thermal.heat_sink_c += thermal.constants.heat_sink_k_per_w * constants.idle_load_w
+        thermal.motor_c = self.ambient_c + random.uniform(0.0, 2.0)
+        thermal.places_warmer_c = [random.uniform(2.0, 5.0), random.uniform(1.0, 3.0)]
+        thermal.places_c = [self.ambient_c + warmer_c for warmer_c in thermal.places_warmer_c]
+        self.mains = Mains(constants.mains_v)
+        self._swing()
+        self.dc_link_v = self.mains.peak_v
+        self.reset_lowest()
+        self._write_constants()
+        self._write_battery()
 
-    # -- values -----------------------------------------------------------------------
+    # -- motion -----------------------------------------------------------------------
+
+    def step(self, dt_s: float) -> None:
+        """Move the supply alone on by whole cycles."""
+        self.prepare()
+        for _ in range(round(dt_s / k.DT_S)):
+            k.supply_cycle(self.s, self.p)
+        self.settle()
+
+    def prepare(self) -> None:
+        """Hand commands and slow values to the kernel, before it runs."""
+        p, commands = self.p, self.commands
+        p[k.MAINS_PEAK_V] = self.mains.peak_v
+        table = self.mains.table()
+        if table is not self._table:
+            self._table = table
+            p[k.LINE_TABLE : k.LINE_TABLE + k.TABLE_LENGTH] = table
+        p[k.SUPPLY_W] = self.adapter_w
+        p[k.UNIT_ON] = float(commands.enabled)
+        p[k.MAINS_FAILED] = float(commands.mains_failed)
+        p[k.BOOSTER_FORCED] = float(commands.booster_on or commands.booster_target_v is not None)
+        p[k.BOOSTER_START_V] = commands.booster_start_v
+        p[k.BOOSTER_TARGET_V] = commands.booster_target_v or 600.0
+        p[k.BOOSTER_LIMIT_A] = commands.booster_limit_a
+        p[k.BATTERY_LEAST_V] = commands.battery_least_v
+        p[k.CHOPPER_FORCED] = float(commands.chopper_on)
+        p[k.CHOPPER_ON_V] = commands.chopper_on_v
+        p[k.CHOPPER_OFF_V] = commands.chopper_off_v
+        p[k.CHARGE_A] = commands.charge_a
+        self._write_battery()
+
+    def settle(self) -> None:
+        """Take over what the kernel counted, after it ran; the slow part moves on every 100 ms."""
+        cycle = self.s[k.CYCLE]
+        if cycle - self._slow_cycle >= _SLOW_CYCLES:
+            dt_s = (cycle - self._slow_cycle) * k.DT_S
+            self._slow_cycle = cycle
+            self._settle_slow(dt_s)
+
+    def _settle_slow(self, dt_s: float) -> None:
+        s, constants, blocs = self.s, self.constants, self.blocs
+        booked = (
+            s[k.DISCHARGED_AS] - s[k.CHARGED_AS],
+            s[k.BATTERY_A2S],
+            s[COPPER_J],
+            s[INVERTER_J],
+            s[k.TURNOVER_J],
+            s[k.BOOSTER_LOSS_J],
+        )
+        flowed_as, square_a2s, copper_j, inverter_j, turnover_j, booster_j = (
+            now - before for now, before in zip(booked, self._booked, strict=True)
+        )
+        self._booked = booked
+        losses = Losses(
+            heat_sink_w=constants.idle_load_w + (inverter_j + booster_j) / dt_s,
+            motor_w=(copper_j + constants.iron_loss_share * turnover_j) / dt_s,
+            blocs_w=[square_a2s * bloc.ohm * (1 + constants.polarisation_share) / dt_s for bloc in blocs],
+        )
+        for bloc in blocs:
+            bloc.flow(flowed_as, dt_s)
+        self.thermal.step(dt_s, self.hub_c, losses, blocs)
+        self._swing()
+        self._write_battery()
+
+    def _swing(self) -> None:
+        constants = self.constants
+        self.mains.swing_v = constants.mains_swing_v * sin(
+            (2 * pi) * self.age_s / constants.mains_period_s + self._phase
+        )
+
+    def _write_constants(self) -> None:
+        p, constants = self.p, self.constants
+        p[k.RECTIFIER_SHARE] = 1.0 - exp(-k.DT_S / (constants.line_ohm * constants.capacity_f))
+        p[k.CAPACITY_F] = constants.capacity_f
+        p[k.ELECTRONICS_W] = constants.idle_load_w
+        p[k.LOCKOUT_V] = constants.lockout_v
+        p[k.CHOPPER_OHM] = constants.chopper_ohm
+        p[k.BOOSTER_EFFICIENCY] = constants.booster_efficiency
+        p[k.BOOSTER_LOOP_S] = constants.booster_loop_s
+        p[k.CHARGER_EFFICIENCY] = constants.charger_efficiency
+        p[k.POLARISATION_SHARE] = k.DT_S / constants.polarisation_s
+
+    def _write_battery(self) -> None:
+        p = self.p
+        ohm = self.battery_ohm
+        p[k.OPEN_CIRCUIT_V] = self.open_circuit_v
+        p[k.BATTERY_OHM] = ohm + self.constants.lead_ohm
+        p[k.POLARISATION_OHM] = ohm * self.constants.polarisation_share
+
+    # -- values: time, mains, DC link ---------------------------------------------------
+
+    @property
+    def age_s(self) -> float:
+        """Time that the supply has run."""
+        return self.s[k.CYCLE] * k.DT_S
+
+    @property
+    def mains_present(self) -> bool:
+        """The mains is there at all."""
+        return self.mains.present
+
+    @mains_present.setter
+    def mains_present(self, present: bool) -> None:
+        self.mains.present = present
+
+    @property
+    def mains_factor(self) -> float:
+        """The mains against its nominal voltage."""
+        return self.mains.factor
+
+    @mains_factor.setter
+    def mains_factor(self, factor: float) -> None:
+        self.mains.factor = factor
+
+    @property
+    def phases(self) -> list[float]:
+        """Share of each phase, 1.0 sound, 0.0 lost."""
+        return self.mains.phases
+
+    @phases.setter
+    def phases(self, phases: list[float]) -> None:
+        self.mains.phases = phases
 
     @property
     def mains_now_v(self) -> float:
-        """Mains voltage, phase to phase."""
-        if not self.mains_present:
-            return 0.0
-        constants = self.constants
-        swing = constants.mains_swing_v * sin((2 * pi) * self._age_s / constants.mains_period_s + self._phase)
-        return constants.mains_v * self.mains_factor + swing
+        """Mains voltage, phase to phase, the highest of the three."""
+        return self.mains.highest_v
+
+    @property
+    def dc_link_v(self) -> float:
+        """Voltage of the DC link."""
+        return self.s[k.DC_LINK_V]
+
+    @dc_link_v.setter
+    def dc_link_v(self, voltage: float) -> None:
+        self.s[k.DC_LINK_V] = voltage
+
+    @property
+    def motor_power_w(self) -> float:
+        """What the inverter takes from the DC link; negative: it feeds back."""
+        return self.s[k.MOTOR_DC_W]
+
+    @motor_power_w.setter
+    def motor_power_w(self, power_w: float) -> None:
+        self.s[k.MOTOR_DC_W] = power_w
+
+    @property
+    def chopper_on(self) -> bool:
+        """The brake resistor is on the DC link."""
+        return self.s[k.CHOPPER_ON] != 0.0
+
+    @property
+    def chopper_w(self) -> float:
+        """What it burns."""
+        return self.s[k.CHOPPER_W]
+
+    @property
+    def booster_on(self) -> bool:
+        """The booster works."""
+        return self.s[k.BOOSTER_ON] != 0.0
+
+    @property
+    def booster_a(self) -> float:
+        """Its output current."""
+        return self.s[k.BOOSTER_A]
+
+    @property
+    def booster_limited(self) -> bool:
+        """Its current limit or the least battery voltage keeps it from giving what is wanted."""
+        return self.s[k.BOOSTER_GOVERNOR] != 0.0
+
+    @property
+    def booster_current_limited(self) -> bool:
+        """It is its current limit that does so."""
+        return self.s[k.BOOSTER_GOVERNOR] == 1.0
+
+    # -- values: battery -------------------------------------------------------------------
 
     @property
     def open_circuit_v(self) -> float:
         """Battery voltage without load."""
-        return sum(self._bloc_rest_v(bloc) for bloc in self.blocs)
+        return in_series_v(self.blocs)
+
+    @property
+    def battery_ohm(self) -> float:
+        """Internal resistance of all blocs, as it has become."""
+        return in_series_ohm(self.blocs)
+
+    @property
+    def battery_a(self) -> float:
+        """Battery current; positive discharges."""
+        return self.s[k.BATTERY_A]
 
     @property
     def battery_v(self) -> float:
-        """Voltage at the battery clamps; positive current discharges."""
-        return self.open_circuit_v - self.battery_a * (self.battery_ohm + self.constants.lead_ohm)
+        """Voltage at the battery clamps."""
+        drop_v = self.battery_a * self.p[k.BATTERY_OHM]
+        return self.open_circuit_v - self.s[k.POLARISATION_V] - drop_v
+
+    @property
+    def lowest_battery_v(self) -> float:
+        """The lowest since ``reset_lowest``."""
+        return min(self.s[k.LOWEST_BATTERY_V], self.battery_v)
+
+    def reset_lowest(self) -> None:
+        """Begin to look for the lowest battery voltage."""
+        self.s[k.LOWEST_BATTERY_V] = 1e9
 
     @property
     def charge(self) -> float:
         """Mean state of charge, 0..1."""
         return sum(bloc.charge for bloc in self.blocs) / len(self.blocs)
 
+    def bloc_v(self, number: int) -> float:
+        """Voltage of a bloc, counted from 0, at its own clamps."""
+        bloc = self.blocs[number]
+        slow_v = self.s[k.POLARISATION_V] / len(self.blocs)
+        return max(bloc.rest_v - slow_v - self.battery_a * bloc.ohm, 0.0)
+
+    # -- values: 24 V -----------------------------------------------------------------------
+
     @property
     def supply_v(self) -> float:
-        """24 V supply, internal."""
-        return self.constants.supply_v - 0.1 * self.supply_a
+        """The 24 V rail: an external feed-in less its diode, else the internal supply."""
+        constants = self.constants
+        if self.external_v is not None:
+            return self.external_v - constants.diode_v
+        return constants.supply_v - self.supply_drop_v - constants.supply_ohm * self.supply_a
 
     @property
     def supply_a(self) -> float:
         """Current out of the 24 V supply, own consumption included."""
-        return self.constants.supply_a + (self.constants.brake_a if self.brake_lifted else 0.0)
+        constants = self.constants
+        brake_a = constants.brake_a if self.brake_lifted else 0.0
+        return constants.supply_a + brake_a + constants.fan_a * self.thermal.fans + self.extra_supply_a
 
-    def bloc_v(self, number: int) -> float:
-        """Voltage of a bloc, counted from 0."""
-        drop = self.battery_a * self.battery_ohm / len(self.blocs)
-        return self._bloc_rest_v(self.blocs[number]) - drop
+    @property
+    def adapter_w(self) -> float:
+        """Input of the internal 24 V adapter; it rests while the rail is fed from outside."""
+        if self.external_v is not None:
+            return 0.0
+        return self.supply_v * self.supply_a / self.constants.adapter_efficiency
+
+    # -- values: temperatures ------------------------------------------------------------------
 
     @property
     def hub_c(self) -> float:
         """Air temperature in the hub."""
         constants = self.constants
         return self.ambient_c + constants.ambient_swing_c * sin(
-            (2 * pi) * self._age_s / constants.ambient_period_s + self._phase
+            (2 * pi) * self.age_s / constants.ambient_period_s + self._phase
         )
+
+    @property
+    def heat_sink_c(self) -> float:
+        """Temperature of the heat sink."""
+        return self.thermal.heat_sink_c
+
+    @heat_sink_c.setter
+    def heat_sink_c(self, temperature_c: float) -> None:
+        self.thermal.heat_sink_c = temperature_c
+
+    @property
+    def motor_c(self) -> float:
+        """Temperature of the motor's windings."""
+        return self.thermal.motor_c
+
+    @motor_c.setter
+    def motor_c(self, temperature_c: float) -> None:
+        self.thermal.motor_c = temperature_c
+
+    @property
+    def extra_heat_sink_w(self) -> float:
+        """Heat put into the heat sink from outside."""
+        return self.thermal.extra_heat_sink_w
+
+    @extra_heat_sink_w.setter
+    def extra_heat_sink_w(self, power_w: float) -> None:
+        self.thermal.extra_heat_sink_w = power_w
+
+    @property
+    def extra_motor_w(self) -> float:
+        """The same for the motor."""
+        return self.thermal.extra_motor_w
+
+    @extra_motor_w.setter
+    def extra_motor_w(self, power_w: float) -> None:
+        self.thermal.extra_motor_w = power_w
+
+    @property
+    def extra_battery_w(self) -> float:
+        """The same for the blocs together."""
+        return self.thermal.extra_battery_w
+
+    @extra_battery_w.setter
+    def extra_battery_w(self, power_w: float) -> None:
+        self.thermal.extra_battery_w = power_w
 
     def sensor_c(self, number: int) -> float:
         """Temperature at an external sensor, counted from 0."""
-        return self.hub_c + self.sensor_warmer_c[number]
-
-    # -- motion -----------------------------------------------------------------------
-
-    def step(self, dt_s: float) -> None:
-        """Move on by ``dt_s``."""
-        self._age_s += dt_s
-        self._step_dc_link(dt_s)
-        self._step_battery(dt_s)
-        self._step_heat(dt_s)
-
-    @staticmethod
-    def _bloc_rest_v(bloc: Bloc) -> float:
-        return open_circuit_v(bloc.charge) + bloc.offset_v
-
-    def _step_dc_link(self, dt_s: float) -> None:
-        constants, commands = self.constants, self.commands
-        voltage = self.dc_link_v
-        self.chopper_w = voltage * voltage / constants.chopper_ohm if commands.chopper_on else 0.0
-        power_w = -(constants.idle_load_w + self.motor_power_w + self.chopper_w)
-        booster_w = self._booster_power_w(dt_s, -power_w)
-        self.booster_a = booster_w / voltage if voltage > 1.0 else 0.0
-        self.battery_a = booster_w / max(self.battery_v, 1.0) - (commands.charge_a if booster_w == 0.0 else 0.0)
-        energy_j = 0.5 * constants.capacity_f * voltage * voltage + (power_w + booster_w) * dt_s
-        voltage = sqrt(max(energy_j, 0.0) * 2 / constants.capacity_f)
-        source_v = self.mains_now_v * sqrt(2)
-        if voltage < source_v:
-            voltage += (source_v - voltage) * (1 - exp(-dt_s / constants.rectifier_s))
-        elif self.mains_present and self.motor_power_w >= 0 and not commands.booster_target_v:
-            voltage += (source_v - voltage) * min(1.0, dt_s)  # what the swing of the mains left above
-        self.dc_link_v = voltage
-
-    def _booster_power_w(self, dt_s: float, load_w: float) -> float:
-        target_v = self.commands.booster_target_v
-        self.booster_limited = False
-        if target_v is None:
-            return 0.0
-        missing_j = 0.5 * self.constants.capacity_f * (target_v**2 - self.dc_link_v**2)
-        wanted_w = max(load_w + missing_j / max(dt_s, 0.02), 0.0)
-        most_w = self.commands.booster_limit_a * max(self.battery_v, 0.0)
-        self.booster_limited = wanted_w > most_w
-        return min(wanted_w, most_w)
-
-    def _step_battery(self, dt_s: float) -> None:
-        change = self.battery_a * dt_s / self.constants.bloc_capacity_as
-        for bloc in self.blocs:
-            bloc.charge = min(max(bloc.charge - change, 0.0), 1.0)
-
-    def _step_heat(self, dt_s: float) -> None:
-        constants = self.constants
-        loss_w = constants.idle_load_w + constants.loss_share * abs(self.motor_power_w)
-        hub_c = self.hub_c
-        heat_sink_c = hub_c + constants.heat_sink_k_per_w * loss_w
-        self.heat_sink_c += (heat_sink_c - self.heat_sink_c) * dt_s / constants.heat_sink_s
-        motor_loss_w = constants.motor_loss_share * max(self.motor_power_w, 0.0)
-        motor_c = hub_c + 1.0 + constants.motor_k_per_w * motor_loss_w
-        self.motor_c += (motor_c - self.motor_c) * dt_s / constants.motor_s
-        for bloc in self.blocs:
-            bloc.temperature_c += (hub_c + bloc.warmer_c - bloc.temperature_c) * dt_s / constants.battery_settle_s
+        return self.thermal.places_c[number]
