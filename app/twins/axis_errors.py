@@ -102,6 +102,11 @@ class AxisErrors:
         return bool(self._warnings) or any(self._stop_of(code) is None for code in self._pending)
 
     @property
+    def stops(self) -> bool:
+        """An error is pending that is more than a message; the watchdog contact is open with it."""
+        return any(self._stop_of(code) is not None for code in self._pending)
+
+    @property
     def gone(self) -> bool:
         """No cause of a pending error stands."""
         return not self._present & self._pending.keys()

@@ -147,6 +147,7 @@ class CanopenDevice:
         self._silence()
         self.power = Power.OFF
         self.application.powered_off()
+        self.application.powered_off()
 
     def bus_off(self) -> None:
         """The CAN controller takes itself off the bus (ISO 11898-1, 12.1.4); the device sees its connection lost."""

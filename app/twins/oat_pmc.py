@@ -11,11 +11,13 @@ from app.model.address import Address
 from app.model.datatypes import Raw
 from app.twins.axis_drive import AxisDrive, Mode
 from app.twins.axis_errors import SWITCH_95_CODE, AxisErrors
-from app.twins.canopen_device import MS, SECOND, Application, CanopenDevice
+from app.twins.canopen_device import MS, SECOND, Application, CanopenDevice, Power
 from app.twins.cia402 import Command, Control, Signals, State, StateMachine, Status, command_of
+from app.twins.manual_function import ManualFunction
 from app.twins.object_store import Deferred, RefusedAccessError
 from app.twins.plant import AxisPlant
 from app.twins.plant_power import PowerPlant
+from app.twins.unit_link import AxisFlag, AxisReport, SupplyReport, UnitLink
 from app.wire.nmt import NmtState
 from app.wire.sdo import Abort
 
@@ -25,6 +27,9 @@ TICK_IDLE_NS: Final = 20 * MS
 _CYCLE_NS: Final = MS
 _TEMPERATURE_ALERT_NS: Final = 30 * SECOND
 """Table 48: the motor is turned off 30 s after the alert."""
+_ENCODER_CODES: Final = frozenset((0x7300, 0x7305, 0x7320))
+_BLADE_ENCODER_CODES: Final = frozenset((0x7300, 0x7321))
+"""Errors with which the position by that encoder is not to be trusted."""
 _AUTOSTART: Final = 1 << 0
 _BEYOND_SWITCHES: Final = 1 << 14
 """60FBh/3: the axis may pass limit switches while the node is not operational."""
@@ -64,7 +69,8 @@ class OatPmc(Application):
         self._controlword = 0
         self._commanded = False
         self._forced: Command | None = None
-        self._manual = 0
+        self.link: UnitLink[SupplyReport] | None = None
+        self.manual = ManualFunction(self._store, self._sent_manual, self._reset_by_object)
         self._booted = False
         self._last_ns = 0
         self._was_0 = self._was_90 = self._was_95 = False
@@ -81,7 +87,10 @@ class OatPmc(Application):
     def restarted(self, t_ns: int) -> None:
         """T0: output stage off, brake engaged; the blade stays where it is."""
         self._booted = False
-        self._controlword = self._manual = 0
+        self._controlword = 0
+        self.manual.clear()
+        if self.link is not None:
+            self.link.stop()
         self._commanded, self._forced = False, None
         self._homed = self._homing_error = False
         self._hit_0 = self._hit_90 = self._reset_edge = False
@@ -101,6 +110,17 @@ class OatPmc(Application):
         """T1."""
         self._booted = True
         self._evaluate(t_ns)
+        if self.link is not None:
+            self.link.start(t_ns)
+
+    def powered_off(self) -> None:
+        """Output stage, brake and watchdog contact fall off."""
+        self._booted = False
+        self.drive.switch_off()
+        self.drive.watchdog(False)
+        self.machine.reset()
+        if self.link is not None:
+            self.link.stop()
 
     def communication_error(self, code: int) -> None:
         """8130h and its like; what the axis does is for 6007h to say."""
@@ -113,6 +133,39 @@ class OatPmc(Application):
             self._commanded = True
             self._forced = Command.DISABLE_VOLTAGE if self._store.number(0x6007) == 2 else Command.QUICK_STOP
             self._evaluate(t_ns)
+
+    # -- safety chain and link to the PMM --------------------------------------------------
+
+    def join(self, peer: int) -> None:
+        """Talk with the PMM on node ``peer``."""
+        self.link = UnitLink(self.device, peer, self._report, SupplyReport.from_bytes, self._link_changed)
+
+    @property
+    def watchdog_closed(self) -> bool:
+        """The contact X2.1/X2.2 (60FEh/3 bit 16).
+
+        It stays open while an error is pending, even where an EFC left the fault (T15): else the chain that this error
+        opened would close again by it, and end the EFC.
+        """
+        return self.drive.watchdog_closed and not self.errors.stops and self.device.power is not Power.OFF
+
+    def _report(self) -> AxisReport:
+        drive, store = self.drive, self._store
+        feed, shaft = store.number(0x6092, 1), store.number(0x6092, 2)
+        by_blade = store.number(0x606A) == -1
+        bad = (_BLADE_ENCODER_CODES if by_blade else _ENCODER_CODES).intersection(self.errors.pending)
+        flags = AxisFlag.NONE if bad or not feed else AxisFlag.POSITION_VALID
+        flags |= AxisFlag.MOVES if self.plant.speed_rad_s != 0.0 else AxisFlag.NONE
+        flags |= AxisFlag.FAULT if self.errors.stops else AxisFlag.NONE
+        position_cdeg = round(drive.position * 36000 * shaft / feed) if feed else 0
+        return AxisReport(position_cdeg, round(self._power.motor_c * 10), flags)
+
+    def _link_changed(self, _broken: bool) -> None:
+        """Table 6 has no code of the PMC for it; the manual function is 0 while its PMM is not heard."""
+
+    def _sent_manual(self) -> int:
+        data = None if self.link is None else self.link.data
+        return 0 if data is None else data.manual
 
     # -- time -------------------------------------------------------------------------
 
@@ -261,10 +314,10 @@ class OatPmc(Application):
         operational = self.device.state is NmtState.OPERATIONAL
         levels = {
             0: self.plant.brake_lifted,
-            16: self.drive.watchdog_closed,
+            16: self.watchdog_closed,
             24: self._booted,
             25: fault,
-            26: self.drive.watchdog_closed,
+            26: self.watchdog_closed,
             27: operational,
         }
         return sum(1 << bit for bit, level in levels.items() if level)
@@ -368,7 +421,6 @@ class OatPmc(Application):
         store.cell(0x6060).guard = self._check_mode
         store.cell(0x6060).effect = self._on_mode
         store.cell(0x606A).guard = self._only_at_rest
-        store.cell(0x5040).effect = self._on_manual_control
         for cell in store:
             if cell.effect is None and cell.entry.address.major in _SCALING_OBJECTS:
                 cell.effect = self._refresh
@@ -400,12 +452,10 @@ class OatPmc(Application):
         if not self.drive.at_rest:
             raise RefusedAccessError(Abort.DEVICE_STATE)
 
-    def _on_manual_control(self, raw: Raw) -> None:
-        """Bit 7 of 5040h rising resets errors (table 8)."""
-        before, self._manual = self._manual, raw if isinstance(raw, int) else 0
-        if self._manual & ~before & 0x80:
-            self._reset_edge = True
-            self._evaluate(self.device.line.now_ns)
+    def _reset_by_object(self) -> None:
+        """Bit 7 of 5040h; it counts while the EFC input controls too, when the controlword does not."""
+        self._reset_edge = True
+        self._evaluate(self.device.line.now_ns)
 
 
 def _read_only(_raw: Raw) -> None:

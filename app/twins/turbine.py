@@ -28,6 +28,7 @@ from app.twins.oat_pmm import OatPmm
 from app.twins.plant import AxisPlant
 from app.twins.plant_power import PowerPlant
 from app.twins.ports import Alarm, Line
+from app.twins.safety_chain import SafetyChain
 
 BLADES: Final = (1, 2, 3)
 START_ANGLE_DEG: Final = 80.0
@@ -56,6 +57,8 @@ class Settings:
     save_ns: int = 300 * MS
     factory: bool = False
     angle_deg: float = START_ANGLE_DEG
+    unit_link: bool = True
+    """PMM and PMC of a blade send each other what they tell over the bus."""
 
 
 def commissioned(encoder_zero_deg: float, blade_encoder_zero_deg: float) -> dict[Address, int]:
@@ -102,6 +105,10 @@ class Blade:
             self.axis,
             self.power,
         )
+        self.pmm.feeds = self.devices
+        if settings.unit_link:
+            self.pmm.join(node)
+            self.pmc.join(number)
         self._alarm = Alarm(line)
         self._last_ns = 0
 
@@ -147,6 +154,7 @@ class Turbine:
         if settings.state_dir is not None:
             _make_folder(settings.state_dir)
         self.blades = tuple(Blade(line, number, pmm, pmc, settings) for number in BLADES)
+        self.chain = SafetyChain(line, self.blades)
 
     @property
     def devices(self) -> dict[int, CanopenDevice]:
@@ -163,9 +171,11 @@ class Turbine:
         """Switch everything on at ``t_ns`` (line time)."""
         for blade in self.blades:
             blade.power_on(t_ns)
+        self.chain.start(t_ns)
 
     def power_off(self) -> None:
         """Switch everything off; remanent values are kept."""
+        self.chain.stop()
         for blade in self.blades:
             blade.power_off()
 
