@@ -1,25 +1,34 @@
 """The controllers of one axis: set-points by mode, position and velocity control, current limit (manual, 5.2 to 5.15).
 
-Sits between the state machine, which switches it on and off, and the plant, which it moves. Works in position units;
-every step is 1 ms, the controller's own cycle (manual, 60C2h).
+Sits between the state machine, which switches it on and off, and the plant, which it moves. It says what is to be done,
+in position units; the cycles of 1 ms themselves are those of ``axis_kernel``.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from enum import Enum
-from math import pi
+from math import exp, pi
 from typing import Final
 
+from app.twins import axis_kernel as k
 from app.twins.axis_profile import Profile, SetPoints, Target
 from app.twins.axis_scaling import Scaling, blade_scaling, motor_scaling
 from app.twins.cia402 import Stop
 from app.twins.object_store import ObjectStore
-from app.twins.plant import AxisPlant
+from app.twins.plant import BLADE_INCREMENTS_PER_RAD, ENCODER_INCREMENTS, AxisPlant
 
-CYCLE_S: Final = 0.001
-_VELOCITY_LOOP_S: Final = 0.005
-"""Time constant of the closed velocity loop (estimate; 60F9h holds gains without units)."""
+_VELOCITY_LOOP_S: Final = 0.010
+_VELOCITY_RESET_S: Final = 0.100
+_CURRENT_LOOP_S: Final = 0.002
+_VELOCITY_GAIN, _VELOCITY_INTEGRAL, _VELOCITY_DIFFERENTIAL = 100, 200, 100
+_CURRENT_GAIN, _CURRENT_INTEGRAL = 16, 512
+"""60F9h and 60F6h hold gains without units. With their defaults (for the differential share that is 0) the loops get
+these time constants: current 2 ms, velocity 10 ms, its integral 100 ms, as a drive of this size is tuned (estimate);
+other values change the gains in proportion."""
+_DIFFERENTIAL_S: Final = 0.001
+_LONGEST_FILTER: Final = 16
+"""60F9h/5 is an exponent; beyond it the loop is dead anyway (a minute)."""
 _REST_RAD_S: Final = 1.0
 """Below this the motor counts as standing (0.03 degrees/s of the blade)."""
 _SETTLED_RAD_S: Final = 0.05
@@ -53,19 +62,21 @@ class Mode(Enum):
 _POSITION_MODES: Final = (Mode.PROFILE_POSITION, Mode.CYCLIC_POSITION, Mode.HOMING, Mode.HEATING, Mode.NONE)
 
 
+class Feedback(Enum):
+    """What the axis is controlled with (manual, below table 50: an EFC with an encoder error)."""
+
+    MOTOR_ENCODER = "motor encoder"
+    BLADE_ENCODER = "additional encoder"
+    NONE = "speed control without encoder"
+
+
 @dataclass(frozen=True, slots=True)
 class _Parameters:
-    """Parameters that every cycle needs, read when one of them was written."""
+    """Parameters that are looked at between the cycles, read when one of them was written."""
 
     scaling: Scaling
-    position_gain: float
-    feed_forward: float
     speed_limit_rad_s: float
     peak_torque_nm: float
-    peak_time_s: float
-    following_window: int
-    following_time_s: float
-    position_window: int
     position_time_s: float
     simulation: bool
 
@@ -80,18 +91,14 @@ class AxisDrive:
         self.halted = False
         self.energised = False
         self.watchdog_closed = False
+        self.feedback = Feedback.MOTOR_ENCODER
+        """Set by whoever sees that an encoder has failed."""
         self.targets = SetPoints()
-        self.profile = Profile()
+        self.profile = Profile(plant.s)
         self.limit_active = False
-        self.following_exceeded = False
         self.following_tripped = False
-        self.torque_nm = 0.0
         self._operating = False
         self._stop: Stop | None = None
-        self._peak_s = 0.0
-        self._peak_spent = False
-        self._following_s = 0.0
-        self._window_s = 0.0
         self._feather_target: Target | None = None
         self.blade = blade_scaling(store)
         self._now = self._read_parameters()
@@ -123,7 +130,22 @@ class AxisDrive:
     @property
     def velocity(self) -> float:
         """Actual velocity in units/s (606Ch)."""
-        return self.plant.speed_rad_s * self.scaling.units_per_rad
+        return self.plant.s[k.ENCODER_RAD_S] * self._units_per_rad
+
+    @property
+    def torque_nm(self) -> float:
+        """Torque of the motor."""
+        return self.plant.torque_nm
+
+    @property
+    def following_exceeded(self) -> bool:
+        """The following error is beyond 6065h now."""
+        return self.energised and self.plant.s[k.FOLLOWING_EXCEEDED] != 0.0
+
+    @property
+    def _units_per_rad(self) -> float:
+        """Position units for one radian of the shaft, by what the encoder really counts."""
+        return self.scaling.signed_factor * ENCODER_INCREMENTS / (2 * pi)
 
     @property
     def following_error(self) -> float:
@@ -135,7 +157,7 @@ class AxisDrive:
         """Motor current in 0.1 % of the rated current (6078h)."""
         if self.energised and self._operating and self.mode is Mode.HEATING:
             return self._store.number(0x6410, 13)
-        return abs(self.torque_nm) / self.plant.constants.rated_torque_nm * 1000
+        return abs(self.plant.s[k.CURRENT_A]) / self.plant.constants.rated_current_a * 1000
 
     @property
     def at_rest(self) -> bool:
@@ -145,10 +167,11 @@ class AxisDrive:
     @property
     def busy(self) -> bool:
         """It needs its cycles: something moves or is to move."""
-        if self.plant.slips or not self.energised:
-            return self.plant.slips or self.plant.speed_rad_s != 0.0
+        if not self.energised:
+            return not self.plant.at_rest
         settled = abs(self.plant.speed_rad_s) < _SETTLED_RAD_S and self.profile.velocity == 0.0
-        return not settled or self._window_s < self._now.position_time_s or self._wants_to_move()
+        waits = self.plant.s[k.WINDOW_S] < self._now.position_time_s
+        return not settled or waits or self._wants_to_move()
 
     # -- commanded by the state machine --------------------------------------------------
 
@@ -167,7 +190,7 @@ class AxisDrive:
         if self.energised:
             self._operating = False
             self._stop = Stop.QUICK
-            self.profile.velocity = 0.0
+            self.profile.put(self.profile.position)
 
     def switch_off(self) -> None:
         """Output stage off."""
@@ -175,10 +198,8 @@ class AxisDrive:
         self._operating = False
         self._stop = None
         self.plant.brake_lifted = False
-        self.torque_nm = 0.0
         self.targets.clear()
-        self.following_exceeded = False
-        self._following_s = 0.0
+        self.plant.s[k.FOLLOWING_S] = self.plant.s[k.FOLLOWING_EXCEEDED] = 0.0
 
     def operate(self, feather: bool) -> None:
         """Follow set-points (T4); where ``feather``, drive to the EFC target."""
@@ -224,7 +245,7 @@ class AxisDrive:
             velocity, acceleration, deceleration = self._motion_limits()
             position = self._limited_position(self._store.number(0x607A))
             self.targets.offer(Target(position, velocity, acceleration, deceleration))
-            self._window_s = 0.0
+            self.plant.s[k.WINDOW_S] = 0.0
 
     def set_home(self) -> bool:
         """Homing method 35: make the actual position that of 607Ah. False where it cannot be done.
@@ -259,108 +280,113 @@ class AxisDrive:
 
     # -- cycles --------------------------------------------------------------------------
 
-    def cycle(self) -> None:
-        """One cycle of 1 ms, plant included."""
-        if not self.energised or self._now.simulation:
-            self.torque_nm = 0.0
-            self.plant.step(CYCLE_S, 0.0)
-            if self.energised:
-                self._move_set_points()
-            return
-        self._move_set_points()
-        self.torque_nm = self._torque()
-        self.plant.step(CYCLE_S, self.torque_nm)
-        self._watch()
+    def advance(self, cycles: int) -> int:
+        """Run up to so many cycles of 1 ms, plant included; gives how many: an event ends them early."""
+        self._command()
+        done = self.plant.advance(cycles)
+        events = self.plant.events
+        if events & int(k.TRIP_EVENT):
+            self.following_tripped = True
+        if events & int(k.REACHED_EVENT):
+            self.targets.arrive()
+            if not self.targets.reached:
+                self.plant.s[k.WINDOW_S] = 0.0
+        return done
 
     @property
     def _controls_position(self) -> bool:
-        return self.energised and self._stop is not Stop.QUICK and self.mode in _POSITION_MODES
+        if not self.energised or self._stop is Stop.QUICK or self.feedback is Feedback.NONE:
+            return False
+        return self.mode in _POSITION_MODES
 
-    def _move_set_points(self) -> None:
-        profile = self.profile
+    def _command(self) -> None:
+        """What the next cycles are to do."""
+        p = self.plant.p
+        p[k.ENERGISED] = 1.0 if self.energised else 0.0
+        p[k.EXTRA_VELOCITY] = p[k.WATCHES_TARGET] = 0.0
+        if not self.energised:
+            return
+        p[k.CONTROLS_POSITION] = 1.0 if self._controls_position else 0.0
+        self._choose_encoders()
         if self._stop is Stop.QUICK:
-            profile.velocity = 0.0
-            profile.position = self.position
+            p[k.SET_KIND] = k.QUICK
         elif self._stop is not None or not self._operating:
-            self._ramp_down()
+            self._hold_at(self._stopping_deceleration())
         elif self.mode is Mode.PROFILE_POSITION:
-            target = self.targets.active
-            if self.halted or target is None:
-                self._ramp_down()
-            else:
-                profile.towards(target, CYCLE_S)
+            self._follow_target()
         elif self.mode is Mode.PROFILE_VELOCITY:
-            _limit, acceleration, deceleration = self._motion_limits()
-            if self.halted:
-                self._ramp_down()
-            else:
-                profile.run(self._velocity_target(), acceleration, deceleration, CYCLE_S)
+            self._follow_velocity(self._stopping_deceleration())
         elif self.mode is Mode.CYCLIC_POSITION:
             self._follow_position()
         elif self.mode is Mode.CYCLIC_VELOCITY:
-            self._follow_velocity()
+            self._follow_velocity(self._current_limit_deceleration())
+        else:
+            self._hold_at(self._stopping_deceleration())
 
-    def _ramp_down(self) -> None:
-        if self.profile.velocity:
-            self.profile.run(0.0, 0.0, self._stopping_deceleration(), CYCLE_S)
+    def _choose_encoders(self) -> None:
+        p = self.plant.p
+        by_blade = self.feedback is Feedback.BLADE_ENCODER
+        p[k.SPEED_SOURCE] = k.BLADE_ENCODER if by_blade else k.MOTOR_ENCODER
+        if self.feedback is Feedback.NONE:
+            p[k.SPEED_SOURCE] = k.NO_ENCODER
+        by_blade = by_blade or self._store.number(0x606A) == -1
+        p[k.POSITION_SOURCE] = k.BLADE_ENCODER if by_blade else k.MOTOR_ENCODER
+        if by_blade:
+            failed = self.plant.blade_encoder_failed
+            zero = self.plant.blade_encoder_increments if failed else self.plant.blade_encoder_zero_increments
+            p[k.BLADE_UNITS_PER_RAD] = 0.0 if failed else self.blade.signed_factor * BLADE_INCREMENTS_PER_RAD
+            p[k.BLADE_OFFSET_UNITS] = self.blade.position(zero)
+
+    def _hold_at(self, deceleration: float) -> None:
+        p = self.plant.p
+        p[k.SET_KIND] = k.HOLD
+        p[k.TARGET_DECELERATION] = deceleration
+
+    def _go_to(self, target: Target) -> None:
+        p = self.plant.p
+        p[k.SET_KIND] = k.TOWARDS
+        p[k.TARGET] = target.position
+        p[k.TARGET_VELOCITY] = target.velocity
+        p[k.TARGET_ACCELERATION] = target.acceleration
+        p[k.TARGET_DECELERATION] = target.deceleration
+
+    def _follow_target(self) -> None:
+        target = self.targets.active
+        if self.halted or target is None:
+            self._hold_at(self._stopping_deceleration())
+            return
+        self._go_to(target)
+        self.plant.p[k.WATCHES_TARGET] = 0.0 if self.targets.reached else 1.0
+        if self.feedback is Feedback.NONE:  # no position: towards the 90 degree switch, which ends it
+            self._run_at(target.velocity, target.acceleration, target.deceleration)
 
     def _follow_position(self) -> None:
-        """Mode 8. OPEN minimal or maximal deceleration on halt; the maximal one, the axis stops sooner."""
+        """Mode 8: 607Ah + 60B0h, with 60B1h.
+
+        OPEN minimal or maximal deceleration on halt; the maximal one, the axis stops sooner.
+        """
         if self.halted:
-            self.profile.run(0.0, 0.0, self._current_limit_deceleration(), CYCLE_S)
+            self._hold_at(self._current_limit_deceleration())
             return
         velocity, acceleration, deceleration = self._motion_limits()
         position = self._limited_position(self._store.number(0x607A) + self._store.number(0x60B0))
-        self.profile.towards(Target(position, velocity, acceleration, deceleration), CYCLE_S)
+        self._go_to(Target(position, velocity, acceleration, deceleration))
+        self.plant.p[k.EXTRA_VELOCITY] = self._store.number(0x60B1)
 
-    def _follow_velocity(self) -> None:
-        """Mode 9: 60FFh + 60B1h within the limits."""
+    def _follow_velocity(self, stopping: float) -> None:
+        """Modes 3 and 9: 60FFh (mode 9: + 60B1h) within the limits; ``stopping`` is the deceleration on halt."""
         if self.halted:
-            self.profile.run(0.0, 0.0, self._current_limit_deceleration(), CYCLE_S)
+            self._hold_at(stopping)
             return
         _limit, acceleration, deceleration = self._motion_limits()
-        self.profile.run(self._velocity_target(), acceleration, deceleration, CYCLE_S)
+        self._run_at(self._velocity_target(), acceleration, deceleration)
 
-    def _torque(self) -> float:
-        now = self._now
-        wanted = self.profile.velocity * (now.feed_forward if self._controls_position else 1.0)
-        if self._controls_position:
-            wanted += now.position_gain * (self.profile.position - self.position)
-        limit = now.speed_limit_rad_s
-        wanted_rad_s = min(max(wanted / now.scaling.units_per_rad, -limit), limit)
-        constants = self.plant.constants
-        torque = constants.inertia_kgm2 / _VELOCITY_LOOP_S * (wanted_rad_s - self.plant.speed_rad_s)
-        return self._limited_torque(torque)
-
-    def _limited_torque(self, torque_nm: float) -> float:
-        """Peak current for 60F6h/3, then rated current for as long."""
-        rated_nm = self.plant.constants.rated_torque_nm
-        limit = min(self._now.peak_torque_nm, rated_nm) if self._peak_spent else self._now.peak_torque_nm
-        torque_nm = min(max(torque_nm, -limit), limit)
-        if abs(torque_nm) > rated_nm:
-            self._peak_s += CYCLE_S
-            self._peak_spent = self._peak_s >= self._now.peak_time_s
-        else:
-            self._peak_s = max(0.0, self._peak_s - CYCLE_S)
-            self._peak_spent = self._peak_spent and self._peak_s > 0
-        return torque_nm
-
-    def _watch(self) -> None:
-        """Following error (6065h, 6066h) and position window (6067h, 6068h)."""
-        now = self._now
-        error = abs(self.following_error)
-        self.following_exceeded = now.following_window != _NO_WINDOW and error > now.following_window
-        self._following_s = self._following_s + CYCLE_S if self.following_exceeded else 0.0
-        if self._following_s > now.following_time_s:
-            self.following_tripped = True
-        target = self.targets.active
-        if target is None or self.targets.reached or self.halted:
-            return
-        inside = abs(target.position - self.position) <= now.position_window
-        self._window_s = self._window_s + CYCLE_S if inside else 0.0
-        if inside and self._window_s >= now.position_time_s and self.profile.position == target.position:
-            self.targets.arrive()
-            self._window_s = 0.0 if not self.targets.reached else self._window_s
+    def _run_at(self, velocity: float, acceleration: float, deceleration: float) -> None:
+        p = self.plant.p
+        p[k.SET_KIND] = k.RUN
+        p[k.TARGET_VELOCITY] = velocity
+        p[k.TARGET_ACCELERATION] = acceleration
+        p[k.TARGET_DECELERATION] = deceleration
 
     def _wants_to_move(self) -> bool:
         if not self._operating or self._stop is not None:
@@ -373,12 +399,11 @@ class AxisDrive:
 
     def _hold(self) -> None:
         """Set-points at the actual values; an axis that still moves is brought to rest from its velocity."""
-        self.profile.put(self.position)
-        if abs(self.plant.speed_rad_s) >= _REST_RAD_S:
-            self.profile.velocity = self.velocity
+        moves = abs(self.plant.speed_rad_s) >= _REST_RAD_S
+        self.profile.put(self.position, self.velocity if moves else 0.0)
         self.targets.clear()
-        self._window_s = self._now.position_time_s
-        self._following_s = 0.0
+        self.plant.s[k.WINDOW_S] = self._now.position_time_s
+        self.plant.s[k.FOLLOWING_S] = 0.0
         self.following_tripped = False
 
     # -- limits --------------------------------------------------------------------------
@@ -406,7 +431,7 @@ class AxisDrive:
             self._limited_position(store.number(0x607A)), velocity, acceleration, deceleration
         )
         self.targets.force(self._feather_target)
-        self._window_s = 0.0
+        self.plant.s[k.WINDOW_S] = 0.0
         if store.number(0x60FB, 3) & _FEATHER_BY_VELOCITY:
             self._seek_switch()
 
@@ -463,17 +488,50 @@ class AxisDrive:
 
     def _read_parameters(self) -> _Parameters:
         store = self._store
-        rated_nm = self.plant.constants.rated_torque_nm
+        self._tune()
         return _Parameters(
             scaling=motor_scaling(store),
-            position_gain=store.number(0x60FB, 1),
-            feed_forward=store.number(0x60FB, 2) / 1000,
             speed_limit_rad_s=store.number(0x6080) * 2 * pi / 60,
-            peak_torque_nm=min(store.number(0x6073), 2000) / 1000 * rated_nm,
-            peak_time_s=store.number(0x60F6, 3) / 1000,
-            following_window=store.number(0x6065),
-            following_time_s=store.number(0x6066) / 1000,
-            position_window=store.number(0x6067),
+            peak_torque_nm=min(store.number(0x6073), 2000) / 1000 * self.plant.constants.rated_torque_nm,
             position_time_s=store.number(0x6068) / 1000,
             simulation=bool(store.number(0x60FB, 3) & _SIMULATION),
         )
+
+    def _tune(self) -> None:
+        """Give the cycles the parameters in force (60FBh, 60F9h, 60F6h, 6065h to 6068h, 6073h, 6080h)."""
+        store, p, constants = self._store, self.plant.p, self.plant.constants
+        scaling = motor_scaling(store)
+        p[k.UNITS_PER_RAD] = scaling.signed_factor * ENCODER_INCREMENTS / (2 * pi)
+        p[k.OFFSET_UNITS] = scaling.position(self.plant.encoder_zero_increments)
+        p[k.POSITION_GAIN] = store.number(0x60FB, 1)
+        p[k.FEED_FORWARD] = store.number(0x60FB, 2) / 1000
+        p[k.SIMULATION] = 1.0 if store.number(0x60FB, 3) & _SIMULATION else 0.0
+        p[k.SPEED_LIMIT] = store.number(0x6080) * 2 * pi / 60
+        p[k.PEAK_A] = min(store.number(0x6073), 2000) / 1000 * constants.rated_current_a
+        p[k.NOMINAL_A] = constants.rated_current_a
+        p[k.PEAK_TIME_S] = store.number(0x60F6, 3) / 1000
+        self._tune_velocity_loop()
+        self._tune_current_loop()
+        window = store.number(0x6065)
+        p[k.FOLLOWING_WINDOW] = k.NO_WINDOW if window == _NO_WINDOW else window
+        p[k.FOLLOWING_TIME_S] = store.number(0x6066) / 1000
+        p[k.POSITION_WINDOW] = store.number(0x6067)
+        p[k.POSITION_TIME_S] = store.number(0x6068) / 1000
+
+    def _tune_velocity_loop(self) -> None:
+        """60F9h: gains, and the filter of the measured speed, 2 to the power of sub-index 5 in ms."""
+        store, p, constants = self._store, self.plant.p, self.plant.constants
+        filter_s = 2 ** min(store.number(0x60F9, 5), _LONGEST_FILTER) / 1000
+        usual = constants.inertia_kgm2 / _VELOCITY_LOOP_S / constants.torque_nm_per_a
+        p[k.FILTER] = 1 - exp(-k.CYCLE_S / filter_s)
+        p[k.VELOCITY_P] = usual * store.number(0x60F9, 1) / _VELOCITY_GAIN
+        p[k.VELOCITY_I] = usual / _VELOCITY_RESET_S * store.number(0x60F9, 2) / _VELOCITY_INTEGRAL
+        p[k.VELOCITY_D] = usual * _DIFFERENTIAL_S / filter_s * store.number(0x60F9, 3) / _VELOCITY_DIFFERENTIAL
+
+    def _tune_current_loop(self) -> None:
+        """60F6h: the integral share makes up for what the windings lose; both make a lag of the first order."""
+        store, p, constants = self._store, self.plant.p, self.plant.constants
+        lost = 1 - p[k.DECAY]
+        usual = (1 - exp(-k.CYCLE_S / _CURRENT_LOOP_S)) * constants.resistance_ohm / lost
+        p[k.CURRENT_P] = usual * store.number(0x60F6, 1) / _CURRENT_GAIN
+        p[k.CURRENT_I] = usual * lost * store.number(0x60F6, 2) / _CURRENT_INTEGRAL

@@ -1,9 +1,10 @@
-"""Set-points of an axis: ramps, targets and their hand-over (manual, 5.10, 5.11). Pure; position units and seconds."""
+"""Set-points of an axis: targets and their hand-over (manual, 5.10, 5.11). Pure; position units and seconds."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import copysign, sqrt
+
+from app.twins.axis_kernel import SET_POSITION, SET_VELOCITY
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,46 +18,27 @@ class Target:
 
 
 class Profile:
-    """Position and velocity set-points that move by ramps."""
+    """Position and velocity set-points as the kernel moves them; ``s`` is its state."""
 
-    __slots__ = ("position", "velocity")
+    __slots__ = ("_s",)
 
-    def __init__(self) -> None:
-        self.position = 0.0
-        self.velocity = 0.0
+    def __init__(self, s: list[float]) -> None:
+        self._s = s
 
-    def put(self, position: float) -> None:
-        """Stand at a position."""
-        self.position = position
-        self.velocity = 0.0
+    @property
+    def position(self) -> float:
+        """Set-point of the position."""
+        return self._s[SET_POSITION]
 
-    def towards(self, target: Target, dt_s: float) -> None:
-        """Drive to a target and stop there. Without velocity, acceleration or deceleration it does not move."""
-        acceleration, deceleration = target.acceleration, target.deceleration
-        distance = target.position - self.position
-        if acceleration <= 0 or deceleration <= 0:
-            self.velocity = 0.0
-            return
-        step = deceleration * dt_s / 2
-        braking = sqrt(step * step + 2 * deceleration * abs(distance)) - step
-        wanted = copysign(min(target.velocity, braking), distance)
-        self._change_velocity(wanted, acceleration, deceleration, dt_s)
-        move = self.velocity * dt_s
-        if abs(distance) <= abs(move) and abs(self.velocity) <= deceleration * dt_s * 2:
-            self.put(target.position)
-        else:
-            self.position += move
+    @property
+    def velocity(self) -> float:
+        """Set-point of the velocity, per second."""
+        return self._s[SET_VELOCITY]
 
-    def run(self, velocity: float, acceleration: float, deceleration: float, dt_s: float) -> None:
-        """Drive with a velocity, reached by a ramp."""
-        self._change_velocity(velocity, acceleration, deceleration, dt_s)
-        self.position += self.velocity * dt_s
-
-    def _change_velocity(self, wanted: float, acceleration: float, deceleration: float, dt_s: float) -> None:
-        now = self.velocity
-        faster = abs(wanted) > abs(now) and wanted * now >= 0
-        most = (acceleration if faster else deceleration) * dt_s
-        self.velocity = wanted if abs(wanted - now) <= most else now + copysign(most, wanted - now)
+    def put(self, position: float, velocity: float = 0.0) -> None:
+        """Begin at a position, with a velocity."""
+        self._s[SET_POSITION] = position
+        self._s[SET_VELOCITY] = velocity
 
 
 class SetPoints:

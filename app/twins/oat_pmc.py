@@ -36,7 +36,7 @@ _BEYOND_SWITCHES: Final = 1 << 14
 _OVERSPEED_SHARE: Final = 1.2
 """8400h; its threshold is not printed, 20 % above 6080h is taken."""
 _SCALING_OBJECTS: Final = frozenset(
-    (0x607C, 0x607E, 0x608F, 0x6091, 0x6092, 0x606A, 0x6065, 0x6066, 0x6067, 0x6068, 0x60F6, 0x60FB, 0x6073, 0x6080)
+    (0x607C, 0x607E, 0x608F, 0x6091, 0x6092, 0x606A, 0x6065, 0x6066, 0x6067, 0x6068, 0x60F6, 0x60F9, 0x60FB, 0x6073, 0x6080)
 )
 _BLADE_SCALING_OBJECTS: Final = frozenset((0x687C, 0x687E, 0x688F, 0x6891, 0x6892))
 
@@ -84,6 +84,10 @@ class OatPmc(Application):
 
     # -- application of the mount ---------------------------------------------------
 
+    def begin(self, t_ns: int) -> None:
+        """The axis moves from ``t_ns`` on."""
+        self._last_ns = t_ns
+
     def restarted(self, t_ns: int) -> None:
         """T0: output stage off, brake engaged; the blade stays where it is."""
         self._booted = False
@@ -104,7 +108,7 @@ class OatPmc(Application):
         self.drive.refresh_blade()
         self.machine.reset()
         self._was_0, self._was_90, self._was_95 = self.plant.at_0, self.plant.at_90, self.plant.at_95
-        self._last_ns = self._differs_since_ns = t_ns
+        self._differs_since_ns = t_ns
 
     def booted(self, t_ns: int) -> None:
         """T1."""
@@ -175,17 +179,11 @@ class OatPmc(Application):
         return TICK_BUSY_NS if self.drive.busy else TICK_IDLE_NS
 
     def tick(self, t_ns: int) -> None:
-        """Move axis and monitors on to ``t_ns``."""
-        if self.drive.busy:
-            for cycle_ns in range(self._last_ns + _CYCLE_NS, t_ns + 1, _CYCLE_NS):
-                self.drive.cycle()
-                self._last_ns = cycle_ns
-                if self._look_at_switches():
-                    self._evaluate(cycle_ns)
-        else:
-            self._last_ns = t_ns
-            self.drive.torque_nm = 0.0
-            self.plant.rest()
+        """Move axis, supply and monitors on to ``t_ns``."""
+        while (cycles := (t_ns - self._last_ns) // _CYCLE_NS) > 0:
+            self._last_ns += self.drive.advance(cycles) * _CYCLE_NS
+            if self._look_at_switches():
+                self._evaluate(self._last_ns)
         self._look_at_switches()
         self._monitor(t_ns)
         if self.machine.feathering:

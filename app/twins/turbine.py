@@ -22,10 +22,11 @@ from typing import Final
 from app.errors import UsageError
 from app.model.address import Address
 from app.model.description import Description
-from app.twins.canopen_device import MS, SECOND, CanopenDevice, Mount
-from app.twins.oat_pmc import OatPmc
+from app.twins.canopen_device import MS, CanopenDevice, Mount
+from app.twins.oat_pmc import TICK_BUSY_NS, OatPmc
 from app.twins.oat_pmm import OatPmm
 from app.twins.plant import AxisPlant
+from app.twins.plant_kernel import Run, run_plain
 from app.twins.plant_power import PowerPlant
 from app.twins.ports import Alarm, Line
 from app.twins.safety_chain import SafetyChain
@@ -59,6 +60,8 @@ class Settings:
     angle_deg: float = START_ANGLE_DEG
     unit_link: bool = True
     """PMM and PMC of a blade send each other what they tell over the bus."""
+    run: Run = run_plain
+    """What runs the plants' cycles."""
 
 
 def commissioned(encoder_zero_deg: float, blade_encoder_zero_deg: float) -> dict[Address, int]:
@@ -91,8 +94,8 @@ class Blade:
     def __init__(self, line: Line, number: int, pmm: Description, pmc: Description, settings: Settings) -> None:
         self.number = number
         zero_deg, blade_zero_deg = _ENCODER_ZERO_DEG[number], _BLADE_ENCODER_ZERO_DEG[number]
-        self.axis = AxisPlant(settings.angle_deg, encoder_zero_deg=zero_deg, blade_encoder_zero_deg=blade_zero_deg)
-        self.power = PowerPlant(seed=number)
+        self.axis = AxisPlant(settings.angle_deg, None, zero_deg, blade_zero_deg, settings.run)
+        self.power = PowerPlant(seed=number, s=self.axis.s, p=self.axis.p)
         self.pmm = OatPmm(
             CanopenDevice(line, number, pmm, _mount(settings, pmm, number, "PMM", _PMM_PRODUCT, {})),
             self.power,
@@ -110,7 +113,6 @@ class Blade:
             self.pmm.join(node)
             self.pmc.join(number)
         self._alarm = Alarm(line)
-        self._last_ns = 0
 
     @property
     def devices(self) -> tuple[CanopenDevice, CanopenDevice]:
@@ -119,7 +121,7 @@ class Blade:
 
     def power_on(self, t_ns: int) -> None:
         """Switch both units on; time begins to pass."""
-        self._last_ns = t_ns
+        self.pmc.begin(t_ns)
         for device in self.devices:
             device.power_on(t_ns)
         self._alarm.set(t_ns + self.pmc.tick_ns, self._tick)
@@ -130,18 +132,21 @@ class Blade:
         for device in self.devices:
             device.power_off()
 
+    def advance(self, t_ns: int) -> None:
+        """Bring physics and units to ``t_ns``, as whoever is about to change the plant from outside must do."""
+        self.power.brake_lifted = self.axis.brake_lifted
+        self.power.prepare()
+        self.pmc.tick(t_ns)
+        self.power.settle()
+        self.pmm.tick(t_ns)
+
     def _tick(self, t_ns: int) -> None:
-        """Axis, then supply, then what watches over it. The next tick is sooner while the axis moves."""
-        dt_s = (t_ns - self._last_ns) / SECOND
-        self._last_ns = t_ns
+        """The next one comes sooner while something moves that must be looked at often."""
         try:
-            self.pmc.tick(t_ns)
-            self.power.motor_power_w = self.axis.power_w
-            self.power.brake_lifted = self.axis.brake_lifted
-            self.power.step(dt_s)
-            self.pmm.tick(t_ns)
+            self.advance(t_ns)
         finally:  # a defect in one tick is reported by the line, and time goes on
-            self._alarm.set(t_ns + self.pmc.tick_ns, self._tick)
+            quick = self.power.commands.mains_failed
+            self._alarm.set(t_ns + (TICK_BUSY_NS if quick else self.pmc.tick_ns), self._tick)
 
 
 class Turbine:

@@ -33,7 +33,7 @@ def test_set_point_handshake(rig: BladeRig) -> None:
     assert not rig.bit(BIT_12)
     rig.wait_bit(TARGET_REACHED)
     assert rig.get("6064") == pytest.approx(7500, abs=2)
-    assert rig.angle_deg == pytest.approx(75.0, abs=0.02)
+    assert rig.angle_deg == pytest.approx(75.0, abs=0.03)
 
 
 @pytest.mark.rule("K4")
@@ -49,9 +49,9 @@ def test_a_target_given_in_motion_waits_for_the_first(rig: BladeRig) -> None:
         rig.master.run(5 * MS)
         lowest = min(lowest, rig.angle_deg)
         assert not rig.bit(TARGET_REACHED)
-    assert lowest == pytest.approx(75.0, abs=0.02)
+    assert lowest == pytest.approx(75.0, abs=0.03)
     rig.wait_bit(TARGET_REACHED)
-    assert rig.angle_deg == pytest.approx(78.0, abs=0.02)
+    assert rig.angle_deg == pytest.approx(78.0, abs=0.03)
 
 
 @pytest.mark.rule("K6")
@@ -68,7 +68,7 @@ def test_halt_stops_by_the_ramp_and_keeps_the_target(rig: BladeRig) -> None:
     rig.command(START)
     rig.master.run(50 * MS)
     rig.wait_bit(TARGET_REACHED)
-    assert rig.angle_deg == pytest.approx(60.0, abs=0.02)
+    assert rig.angle_deg == pytest.approx(60.0, abs=0.03)
 
 
 @pytest.mark.rule("K6")
@@ -80,7 +80,7 @@ def test_a_target_given_under_halt_starts_when_halt_ends(rig: BladeRig) -> None:
     rig.master.run(SECOND)
     assert rig.angle_deg == pytest.approx(80.0, abs=0.01)
     rig.command(START)
-    rig.run_until(lambda: rig.angle_deg < 78.01)
+    rig.run_until(lambda: rig.angle_deg < 78.03)
 
 
 @pytest.mark.rule("K7")
@@ -90,7 +90,7 @@ def test_a_target_beyond_the_limits_is_adjusted(rig: BladeRig) -> None:
     rig.enable()
     rig.move(1000)
     assert rig.bit(LIMIT)
-    assert rig.angle_deg == pytest.approx(79.0, abs=0.02)
+    assert rig.angle_deg == pytest.approx(79.0, abs=0.03)
     rig.move(7950)
     assert not rig.bit(LIMIT)
 

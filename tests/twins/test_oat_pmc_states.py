@@ -143,7 +143,7 @@ def test_90_degree_switch_disables_operation_until_enabled_anew() -> None:
     rig.command(SWITCH_ON, ENABLE)
     assert rig.state() is State.OPERATION_ENABLED
     rig.move(8500)
-    assert rig.angle_deg == pytest.approx(85.0, abs=0.02)
+    assert rig.angle_deg == pytest.approx(85.0, abs=0.03)
 
 
 @pytest.mark.rule("J7")
@@ -359,7 +359,7 @@ def test_efc_by_controlword(rig: BladeRig) -> None:
     assert (rig.get("6061"), rig.get("607A"), rig.get("6081")) == (1, 8900, 800)
     assert (rig.get("6083"), rig.get("6084")) == (1500, 1500)
     rig.wait_bit(10)
-    assert rig.angle_deg == pytest.approx(89.0, abs=0.02)
+    assert rig.angle_deg == pytest.approx(89.0, abs=0.03)
     assert rig.state() is State.OPERATION_ENABLED
 
 
@@ -438,7 +438,7 @@ def test_efc_goes_on_to_the_switch_where_the_flags_say_so(rig: BladeRig, flag: i
     rig.put("60FB:03", flag | 1)
     rig.pmc.inputs.efc = False
     rig.master.run(6000 * MS)
-    assert rig.angle_deg == pytest.approx(angle_deg, abs=2.2 if flag else 0.02)
+    assert rig.angle_deg == pytest.approx(angle_deg, abs=2.2 if flag else 0.03)
     assert rig.blade.axis.at_90 is bool(flag)
 
 
@@ -461,6 +461,6 @@ def test_restart_takes_the_stage_off_and_leaves_the_blade(rig: BladeRig) -> None
     rig.move(7000)
     rig.restart()
     assert rig.state() is State.READY
-    assert rig.angle_deg == pytest.approx(70.0, abs=0.02)
+    assert rig.angle_deg == pytest.approx(70.0, abs=0.03)
     assert rig.get("6064") == pytest.approx(7000, abs=2)
     assert rig.get("6060") == 0
