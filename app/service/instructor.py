@@ -11,7 +11,7 @@ import asyncio
 import logging
 from collections.abc import AsyncIterator, Callable, Iterable, Mapping, Sequence
 from contextlib import asynccontextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final, Protocol
 
 from app.errors import FaultOrderError, FaultValueError, HubsideError, TwinsGoneError, UsageError
@@ -87,7 +87,7 @@ class Instructor(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class FaultLine:
+class InjectedLine:
     """A fault that acts. ``since_ns`` is in t_ns of the bench; ``until_ns`` None: until it is cleared."""
 
     id: int
@@ -115,12 +115,12 @@ class InstructorLine:
     """What a page shows. ``available``: the twins are ours; ``answering``: they answered at the last look."""
 
     available: bool
-    answering: bool = True
-    faults: tuple[FaultLine, ...] = ()
-    playing: PlayingLine | None = None
+    answering: bool
+    faults: tuple[InjectedLine, ...]
+    playing: PlayingLine | None
 
 
-NOT_HERE: Final = InstructorLine(available=False)
+NOT_HERE: Final = InstructorLine(available=False, answering=False, faults=(), playing=None)
 
 
 class InstructorDesk:
@@ -136,7 +136,7 @@ class InstructorDesk:
         stamp: Callable[[], int],
         slug_of: Callable[[int], str | None] = lambda _node: None,
     ) -> None:
-        self.line = InstructorLine(available=True)
+        self.line = replace(NOT_HERE, available=True)
         self._instructor = instructor
         self._journal = journal
         self._stamp = stamp
@@ -157,7 +157,7 @@ class InstructorDesk:
         """All scenarios. Raises TwinsGoneError."""
         return await self._instructor.scenarios()
 
-    async def inject(self, order: FaultOrder, person: str) -> FaultLine:
+    async def inject(self, order: FaultOrder, person: str) -> InjectedLine:
         """Put a fault in. Raises FaultOrderError, FaultValueError, TwinsGoneError."""
         checked = await self._checked(order)
         async with self._working:
@@ -244,7 +244,7 @@ class InstructorDesk:
         self._show(playing=None)
         self._journal.by(person).note(Kind.SCENARIO_STOPPED, title=playing.title, scenario=playing.scenario)
 
-    def _cleared(self, faults: Sequence[FaultLine], person: str) -> None:
+    def _cleared(self, faults: Sequence[InjectedLine], person: str) -> None:
         for line in faults:
             self._note(Kind.FAULT_CLEARED, line, person)
         gone = {line.id for line in faults}
@@ -282,12 +282,11 @@ class InstructorDesk:
         return PlayingLine(found.scenario, found.title, since_ns, since_ns + round(found.duration_s * 1e9))
 
     def _show(self, **change: Any) -> None:
-        told = {name: getattr(self.line, name) for name in ("available", "answering", "faults", "playing")}
-        line = InstructorLine(**{**told, **change})
+        line = replace(self.line, **change)
         if line != self.line:
             self.line = line
 
-    def _note(self, kind: Kind, fault: FaultOrder | FaultLine, person: str | None = None) -> None:
+    def _note(self, kind: Kind, fault: FaultOrder | InjectedLine, person: str | None = None) -> None:
         journal = self._journal if person is None else self._journal.by(person)
         device = None if fault.node is None else self._slug_of(fault.node)
         values = ", ".join(f"{name}={number:g}" for name, number in fault.values.items())
@@ -311,16 +310,16 @@ async def watched(desk: InstructorDesk | None) -> AsyncIterator[None]:
         await asyncio.gather(task, return_exceptions=True)
 
 
-def _fault_line(fault: ActiveFault, line_now_ns: int, now_ns: int) -> FaultLine:
+def _fault_line(fault: ActiveFault, line_now_ns: int, now_ns: int) -> InjectedLine:
     order = fault.order
     since_ns = now_ns - (line_now_ns - fault.since_ns)
     until_ns = None if order.seconds is None else since_ns + round(order.seconds * 1e9)
-    return FaultLine(
+    return InjectedLine(
         fault.id, order.kind, order.blade, order.node, dict(order.values), order.seconds, since_ns, until_ns
     )
 
 
-def _where(fault: FaultOrder | FaultLine, device: str | None) -> dict[str, str]:
+def _where(fault: FaultOrder | InjectedLine, device: str | None) -> dict[str, str]:
     """Where a fault acts, as a detail of the journal: a name, or the key of one."""
     if fault.node is not None:
         return {"target": str(fault.node) if device is None else device}

@@ -25,6 +25,7 @@ from app.web.problem import (
     UnauthorisedError,
     problem_of,
 )
+from app.web.routes import instructor
 
 API_VERSION: Final = "1"
 """Of the API itself: a release that does not change it does not change this."""
@@ -42,6 +43,16 @@ OF_A_ROLE: Final = errors.RoleError(needs="technician", has="viewer")
 OF_INPUT: Final = InvalidRequestError(reason="body.raw: Field required")
 OF_A_PATH: Final = NotFoundError(what=_SLUG)
 OF_A_CONNECTION: Final = errors.NotConnectedError()
+OF_THE_INSTRUCTOR: Final = (
+    errors.NoInstructorError(),
+    errors.TwinsGoneError(reason="the connection was closed"),
+)
+OF_A_FAULT: Final = (
+    errors.FaultOrderError(field="blade", reason="fault: field 'blade': is 4, not 1, 2 or 3"),
+    errors.FaultValueError(
+        field="remaining_percent", value=300.0, limits="0 … 130 %", minimum=0.0, maximum=130.0, unit="%"
+    ),
+)
 OF_A_DEVICE: Final[tuple[HubsideError, ...]] = (
     errors.SdoAbortError(node=12, address="3110:01", abort_code=0x08000022, text_key_reason="abort.device_state"),
     errors.BusLostError(bus="can0", reason="the adapter was pulled"),
@@ -117,6 +128,10 @@ def _errors(path: str, dependant: Dependant) -> Iterator[HubsideError]:
         yield OF_A_PATH
     if deps.get_connection in calls:
         yield OF_A_CONNECTION
+    if instructor.get_desk in calls:
+        yield from OF_THE_INSTRUCTOR
+        if dependant.body_params:
+            yield from OF_A_FAULT
     if deps.get_target in calls:
         yield from OF_A_DEVICE
 

@@ -20,6 +20,7 @@ from app import __version__
 from app.service.bench import Bench
 from app.service.connection import Connection
 from app.service.devices import Target
+from app.service.instructor import NOT_HERE, InstructorLine
 from app.service.journal import Entry
 from app.service.link import LinkLine, bench_line, link_urgent
 from app.service.rotor_view import NOBODY, rotor_line
@@ -46,6 +47,7 @@ from app.web.models import (
     HeartbeatMessage,
     Hello,
     HelloMessage,
+    InstructorMessage,
     LinkMessage,
     NodesMessage,
     RotorMessage,
@@ -99,6 +101,7 @@ class Feed:
         self._axes: tuple[AxisLine, ...] = ()
         self._axes_cursor = -1
         self._rotor = NOBODY
+        self._instructor: InstructorLine | None = None
         self._nodes_urgent: tuple[Any, ...] = ()
         self._nodes_changed = False
         self._told_events = False
@@ -156,6 +159,8 @@ class Feed:
             yield from self._axes_due(now_s)
         if "rotor" in self._topics:
             yield from self._rotor_due(now_s)
+        if "instructor" in self._topics:
+            yield from self._instructor_due()
         yield from self._events_due(changes)
         if "trace" in self._topics:
             yield from self._trace_due(now_s)
@@ -234,6 +239,13 @@ class Feed:
         if line != self._rotor or "rotor" in self._fresh:
             self._rotor = line
             yield RotorMessage(seq=self._count(), t_ns=now_ns, data=line)
+
+    def _instructor_due(self) -> Iterator[ServerMessage]:
+        desk = self._bench.instructor
+        line = NOT_HERE if desk is None else desk.line
+        if line is not self._instructor or "instructor" in self._fresh:
+            self._instructor = line
+            yield InstructorMessage(seq=self._count(), t_ns=self._bench.stamper(), data=line)
 
     def _link_due(self, now_s: float) -> Iterator[ServerMessage]:
         if not self._passed("look at link", now_s, LINK_LOOK_S):

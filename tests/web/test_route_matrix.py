@@ -76,6 +76,15 @@ ROUTES: Final[dict[tuple[str, str], Role]] = {
     ("GET", "/api/sets/{turbine}/{file}"): VIEWER,
     ("GET", "/api/sets/{turbine}/{file}/download"): VIEWER,
     ("POST", "/api/live/backup"): TECHNICIAN,
+    # faults in our own twins
+    ("GET", "/api/instructor"): VIEWER,
+    ("GET", "/api/instructor/catalogue"): VIEWER,
+    ("GET", "/api/instructor/scenarios"): VIEWER,
+    ("POST", "/api/instructor/faults"): TECHNICIAN,
+    ("DELETE", "/api/instructor/faults"): TECHNICIAN,
+    ("DELETE", "/api/instructor/faults/{fault}"): TECHNICIAN,
+    ("POST", "/api/instructor/play"): TECHNICIAN,
+    ("POST", "/api/instructor/stop"): TECHNICIAN,
     # settings
     ("GET", "/api/settings/about"): VIEWER,
     ("GET", "/api/settings/adapters"): VIEWER,
@@ -118,6 +127,7 @@ PLACES: Final = {
     "{path:path}": "index.html",
     "{user_id}": "0197a000-0000-7000-8000-000000000000",
     "{job_id}": "none",
+    "{fault}": "1",
     "{name}": "none.mcap",
     "{file}": "none.json",
 }

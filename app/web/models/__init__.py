@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, StrictFloat, StrictInt, StrictStr
 
+from app.service.instructor import InstructorLine
 from app.service.link import LinkLine, Mode
 from app.service.rotor_view import RotorLine
 from app.service.trace.tail import TraceBatch
@@ -293,6 +294,13 @@ class RotorMessage(_Envelope):
     data: RotorLine
 
 
+class InstructorMessage(_Envelope):
+    """Topic ``instructor``: faults and scenario of the twins that this server started, where they changed."""
+
+    type: Literal["instructor"] = "instructor"
+    data: InstructorLine
+
+
 class ValuesMessage(_Envelope):
     """Topic ``values:<slug>``: all that is known, then what changed."""
 
@@ -322,6 +330,7 @@ ServerMessage = Annotated[
     | NodesMessage
     | AxesMessage
     | RotorMessage
+    | InstructorMessage
     | ValuesMessage
     | EventMessage
     | TraceMessage,

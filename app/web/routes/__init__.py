@@ -8,6 +8,7 @@ from app.web.deps import ANY_PROBLEM
 from app.web.routes import (
     audit,
     devices,
+    instructor,
     jobs,
     recordings,
     session,
@@ -21,7 +22,22 @@ from app.web.routes import (
     writes,
 )
 
-FEATURES = (session, turbine, devices, jobs, stop, writes, recordings, sets, users, audit, visits, settings, trace)
+FEATURES = (
+    session,
+    turbine,
+    devices,
+    jobs,
+    stop,
+    writes,
+    recordings,
+    sets,
+    users,
+    audit,
+    visits,
+    settings,
+    trace,
+    instructor,
+)
 
 
 def api_router() -> APIRouter:
