@@ -39,44 +39,30 @@ class DataType(Enum):
     UNSIGNED56 = 0x001A
     UNSIGNED64 = 0x001B
 
-    @property
-    def is_integer(self) -> bool:
-        """True for BOOLEAN, INTEGERn and UNSIGNEDn."""
-        return self in _INTEGER_BITS
+    is_integer: bool
+    """True for BOOLEAN, INTEGERn and UNSIGNEDn."""
+    is_signed: bool
+    """True for INTEGERn."""
+    bits: int | None
+    """Width on the wire and in a PDO mapping, in bits; None where the length varies."""
+    size: int | None
+    """Length of an SDO transfer in bytes; None where it varies."""
+    range: tuple[int, int] | None
+    """Smallest and largest raw value of an integer type, else None."""
 
-    @property
-    def is_signed(self) -> bool:
-        """True for INTEGERn."""
-        return self.name.startswith("INTEGER")
-
-    @property
-    def bits(self) -> int | None:
-        """Width on the wire and in a PDO mapping, in bits; None where the length varies."""
-        if self in _INTEGER_BITS:
-            return _INTEGER_BITS[self]
-        return {DataType.REAL32: 32, DataType.REAL64: 64}.get(self, 48 if self in _TIME else None)
-
-    @property
-    def size(self) -> int | None:
-        """Length of an SDO transfer in bytes; None where it varies."""
-        bits = self.bits
-        return None if bits is None else (bits + 7) // 8
-
-    @property
-    def range(self) -> tuple[int, int] | None:
-        """Smallest and largest raw value of an integer type, else None."""
-        if not self.is_integer:
-            return None
-        bits = _INTEGER_BITS[self]
-        return (-(1 << bits - 1), (1 << bits - 1) - 1) if self.is_signed else (0, (1 << bits) - 1)
+    def __init__(self, _index: int) -> None:
+        # Found out once: encoding and decoding ask for these at every frame.
+        name, digits = self._name_.rstrip("0123456789"), self._name_.lstrip("ABCDEFGHIJKLMNOPQRSTUVWXYZ_")
+        self.is_signed = name == "INTEGER"
+        self.is_integer = name in ("INTEGER", "UNSIGNED", "BOOLEAN")
+        self.bits = int(digits) if digits else {"BOOLEAN": 1, "TIME_OF_DAY": 48, "TIME_DIFFERENCE": 48}.get(name)
+        self.size = None if self.bits is None else (self.bits + 7) // 8
+        self.range = None
+        if self.is_integer and self.bits is not None:
+            half = 1 << self.bits - 1
+            self.range = (-half, half - 1) if self.is_signed else (0, 2 * half - 1)
 
 
-_INTEGER_BITS: Final = {
-    t: 1 if t is DataType.BOOLEAN else int(t.name.removeprefix("INTEGER").removeprefix("UNSIGNED"))
-    for t in DataType
-    if t is DataType.BOOLEAN or t.name.startswith(("INTEGER", "UNSIGNED"))
-}
-_TIME: Final = (DataType.TIME_OF_DAY, DataType.TIME_DIFFERENCE)
 _FLOAT: Final = {DataType.REAL32: "<f", DataType.REAL64: "<d"}
 
 

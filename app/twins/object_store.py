@@ -69,11 +69,12 @@ class Cell:
 
     def to_bytes(self) -> bytes:
         """The value as it goes over the wire. A live number beyond the type's range is held at its limit."""
-        value = self.now
-        span = self.entry.type.range
-        if span is not None and isinstance(value, int):
-            value = min(max(value, span[0]), span[1])
-        return encode_raw(self.entry.type, value)
+        value = self.raw if self.source is None else self.source()
+        kind = self.entry.type
+        span = kind.range
+        if span is None or self.size is None or not isinstance(value, int):
+            return encode_raw(kind, value)
+        return min(max(value, span[0]), span[1]).to_bytes(self.size, "little", signed=kind.is_signed)
 
 
 def initial(entry: Entry, node_id: int) -> Raw:
