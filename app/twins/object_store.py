@@ -116,7 +116,9 @@ class ObjectStore:
 
     def number(self, index: int, sub: int = 0) -> int:
         """The raw value of an integer object that the device must have."""
-        return self._by_number[index << 8 | sub].number
+        cell = self._by_number[index << 8 | sub]
+        value = cell.raw if cell.source is None else cell.source()
+        return value if isinstance(value, int) else cell.number
 
     def at(self, address: Address) -> Cell:
         """The cell that a client asks for.
