@@ -124,8 +124,8 @@ class UnitLink(Generic[HeardT]):
         return self._data
 
     def start(self, t_ns: int) -> None:
-        """Begin to send, after the boot-up."""
-        self._tick(t_ns)
+        """Begin to send, after the boot-up message, which has the higher identifier."""
+        self._alarm.set(t_ns + PERIOD_NS, self._tick)
 
     def stop(self) -> None:
         """Fall silent and forget, for a restart."""
