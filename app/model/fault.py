@@ -31,8 +31,8 @@ class FaultLevel(Enum):
 class FaultTarget(Enum):
     """What a fault is put into.
 
-    ``TURBINE``: all blades, or the ``blade`` that the order names. ``BLADE``: the order must name it. ``NODE``: the
-    order must name the node. ``BUS``: all frames, or those that the ``node`` of the order sends.
+    ``TURBINE``: all blades, or the ``blade`` that the order names (a momentary one has all). ``BLADE``: the order must
+    name it. ``NODE``: the order must name the node. ``BUS``: all frames, or those that the ``node`` of the order sends.
     """
 
     TURBINE = "turbine"
@@ -204,7 +204,7 @@ def _check_place(kind: FaultKind, order: FaultOrder) -> None:
     if order.node is None and kind.target is FaultTarget.NODE:
         _wrong("node", f"is missing: {kind.id} needs one")
     if order.blade is not None:
-        if not of_blade:
+        if not of_blade or (kind.target is FaultTarget.TURBINE and kind.momentary):
             _wrong("blade", f"{kind.id} is not of a blade")
         if order.blade not in BLADES:
             _wrong("blade", f"is {order.blade!r}, not 1, 2 or 3")

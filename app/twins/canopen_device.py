@@ -108,8 +108,6 @@ class CanopenDevice:
         self._powered_ns = 0
         self._boot_alarm = Alarm(line)
         self._port = self.port = line.attach(self._on_frame)
-        self.answer_delay_ns = 0
-        """How much later than usual SDO answers are sent."""
         self.store = ObjectStore(description, node_id, factory=mount.factory)
         self._give_identity(mount.identity)
         self.emergency = Emergency(self.store, self._send_emergency, self._uptime_s)
@@ -293,12 +291,16 @@ class CanopenDevice:
         self.application.connection_lost(self.line.now_ns)
 
     def _answer(self, data: bytes, t_ns: int) -> None:
-        late_ns = self._mount.turnaround_ns + self.answer_delay_ns
+        late_ns = self._mount.turnaround_ns + self._sdo.late_ns
         self._port.send(Can(sdo.RESPONSE_BASE + self.node_id, data), t_ns + late_ns)
 
-    def delay_answers(self, delay_ns: int) -> None:
-        """Have SDO answers leave ``delay_ns`` later than usual; what is asked for is done at once."""
-        self.answer_delay_ns = delay_ns
+    @property
+    def answer_delay_ns(self) -> int:
+        """How much later than usual SDO answers are sent; what is asked for is done at once."""
+        return self._sdo.late_ns
+
+    @answer_delay_ns.setter
+    def answer_delay_ns(self, delay_ns: int) -> None:
         self._sdo.late_ns = delay_ns
 
     def _beat(self) -> None:

@@ -78,6 +78,10 @@ class NonVolatile:
             self.memory.saved,
         )
 
+    def preset(self, address: Address, data: bytes) -> None:
+        """Have a value saved, as if somebody had done it before. Raises OSError."""
+        self._write(Memory({**self.memory.saved, address: data}, self.memory.remanent))
+
     def keep(self) -> None:
         """Write the remanent values to the file, if they changed. Where it fails, ``problem`` says why."""
         now = {cell.entry.address: cell.to_bytes() for cell in self._remanent}

@@ -28,6 +28,9 @@ class Port(Protocol):
     def clear(self) -> None:
         """Forget the frames that wait."""
 
+    def detach(self) -> None:
+        """Leave the line."""
+
     def cut(self) -> None:
         """Cut the node off the line: it neither sends nor hears. Cuts add up."""
 

@@ -3,6 +3,7 @@
 ::
 
     title = "Mains failure"        # wanted
+    note = "What to see."          # may be missing
     seed = 7                       # of all that is random in it; default 0
     duration_s = 60.0              # wanted; at its end all faults are cleared
 
@@ -156,6 +157,7 @@ class Scenario:
     title: str
     duration_s: float
     seed: int = 0
+    note: str = ""
     start: Start = field(default_factory=Start)
     presets: tuple[Preset, ...] = ()
     events: tuple[Event, ...] = ()
@@ -164,11 +166,6 @@ class Scenario:
     def duration_ns(self) -> int:
         """How long it takes."""
         return round(self.duration_s * _NS)
-
-    @property
-    def has_controller(self) -> bool:
-        """Whether a turbine controller takes part."""
-        return self.start.controller
 
 
 def load_scenario(path: Path) -> Scenario:
@@ -294,14 +291,16 @@ class _Table:
 
 
 def _scenario(table: _Table) -> Scenario:
-    table.only("title", "seed", "duration_s", "start", "parameters", "event")
+    table.only("title", "note", "seed", "duration_s", "start", "parameters", "event")
     duration_s = table.number("duration_s", 0.1, MAX_DURATION_S)
-    events = [_event(one, duration_s) for one in table.tables("event", "event")]
+    start = _start(table.table("start", "start"))
+    events = [_event(one, duration_s, start) for one in table.tables("event", "event")]
     return Scenario(
         title=table.text("title"),
         duration_s=duration_s,
         seed=table.whole("seed", 0, MAX_SEED, 0),
-        start=_start(table.table("start", "start")),
+        note=table.text("note") if "note" in table.raw else "",
+        start=start,
         presets=tuple(_preset(one) for one in table.tables("parameters", "parameters")),
         events=tuple(sorted(events, key=lambda event: event.at_ns)),
     )
@@ -322,11 +321,13 @@ def _preset(table: _Table) -> Preset:
     return Preset(table.choice("device", Unit), table.address(), table.raw_value(), table.blade(), table.flag("save"))
 
 
-def _event(table: _Table, duration_s: float) -> Event:
+def _event(table: _Table, duration_s: float, start: Start) -> Event:
     at_s = table.number("at_s", 0.0, duration_s)
     kinds = [key for key in ("fault", "clear", "controller", "master") if key in table.raw]
     if len(kinds) != 1:
         table.wrong("fault", "is missing, and so are clear, controller, master" if not kinds else f"and {kinds[1]}")
+    if kinds[0] == "controller" and not start.controller:
+        table.wrong("controller", "is there, but [start] has no controller = true")
     return Event(round(at_s * _NS), _ACTIONS[kinds[0]](table))
 
 

@@ -101,11 +101,17 @@ class Wind:
             self.mean_mps = mean_mps
         self._drift_mps_s = 0.0 if over_s == 0.0 else abs(mean_mps - self.mean_mps) / over_s
 
-    def gust(self, peak_mps: float, rise_s: float, hold_s: float, fall_s: float) -> None:
+    def gust(self, peak_mps: float, rise_s: float, hold_s: float, fall_s: float) -> Gust:
         """A gust from now on, on top of those that blow. Raises ValueError where it has no time or no size."""
         if min(rise_s, hold_s, fall_s) < 0.0 or rise_s + hold_s + fall_s <= 0.0 or not isfinite(peak_mps):
             raise ValueError(f"a gust of {peak_mps} m/s with {rise_s}, {hold_s} and {fall_s} s")
-        self._gusts.append((self._t_s, Gust(peak_mps, rise_s, hold_s, fall_s)))
+        gust = Gust(peak_mps, rise_s, hold_s, fall_s)
+        self._gusts.append((self._t_s, gust))
+        return gust
+
+    def calm(self, gust: Gust) -> None:
+        """End a gust at once, where it still blows."""
+        self._gusts = [(since_s, one) for since_s, one in self._gusts if one is not gust]
 
     def extreme_gust(self, peak_mps: float, duration_s: float = EXTREME_GUST_S) -> None:
         """The extreme operating gust from now on. Raises ValueError where it has no time or no size."""

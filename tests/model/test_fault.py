@@ -100,6 +100,7 @@ def test_everything_has_its_text(language: str) -> None:
         ({"fault": "mains_failure", "for_s": -1}, "for_s"),
         ({"fault": "mains_failure", "for_s": "long"}, "for_s"),
         ({"fault": "gust", "for_s": 3}, "for_s"),
+        ({"fault": "gust", "blade": 2}, "blade"),
         ({"fault": "mains_failure", "depth": 3}, "depth"),
         ({"fault": "bloc_weak", "blade": 1, "bloc": 1.5}, "bloc"),
         ({"fault": "bloc_weak", "blade": 1, "bloc": "one"}, "bloc"),

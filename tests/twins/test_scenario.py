@@ -24,6 +24,7 @@ from app.wire.nmt import NmtCommand
 HEAD = 'title = "t"\nduration_s = 60\n'
 WHOLE = """
 title = "Everything"
+note = "Look at blade 2."
 seed = 42
 duration_s = 60.0
 
@@ -82,6 +83,7 @@ master = { do = "nmt", node = 0, command = "start" }
 def test_everything_that_a_scenario_can_say() -> None:
     scenario = read_scenario(WHOLE, "s.toml")
     assert (scenario.title, scenario.seed, scenario.duration_ns) == ("Everything", 42, 60_000_000_000)
+    assert scenario.note == "Look at blade 2."
     start = scenario.start
     assert (start.angle_deg, start.wind_mps, start.operational, start.controller) == (3.5, 11.0, True, True)
     assert scenario.presets == (
@@ -145,7 +147,8 @@ def test_little_is_enough() -> None:
         (HEAD + "[[event]]\nat_s = 1\nclear = true\nkind = 'gust'\n", ("event 1: field 'kind'", "not known")),
         (HEAD + "[[event]]\nat_s = 1\nfault = 'flood'\n", ("event 1: field 'kind'", "'flood' is no fault")),
         (HEAD + "[[event]]\nat_s = 1\nfault = 'gust'\ndepth = 3\n", ("event 1: field 'depth'", "no such value")),
-        (HEAD + "[[event]]\nat_s = 1\ncontroller = 3\n", ("event 1: field 'controller'",)),
+        (HEAD + "[start]\ncontroller = true\n[[event]]\nat_s = 1\ncontroller = 3\n", ("event 1: field 'controller'",)),
+        (HEAD + "[[event]]\nat_s = 1\ncontroller = { run = true }\n", ("event 1: field 'controller'", "start")),
         (HEAD + "[[event]]\nat_s = 1\nmaster = { do = 'sing', node = 1 }\n", ("event 1: master: field 'do'",)),
         (HEAD + "[[event]]\nat_s = 1\nmaster = { do = 'read', node = 1 }\n", ("event 1: master: field 'address'",)),
         (HEAD + "[[event]]\nat_s = 1\nmaster = { do = 'save', node = 0 }\n", ("event 1: master: field 'node'",)),
