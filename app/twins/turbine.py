@@ -193,9 +193,14 @@ def build_turbine(
     state_dir: Path | None = None,
     turnaround_ns: int = MS,
     factory: bool = False,
+    run: Run = run_plain,
 ) -> Turbine:
-    """A turbine with the usual settings; call ``power_on`` next. Raises UsageError (state folder)."""
-    return Turbine(line, pmm, pmc, Settings(state_dir=state_dir, turnaround_ns=turnaround_ns, factory=factory))
+    """A turbine with the usual settings; call ``power_on`` next. Raises UsageError (state folder).
+
+    ``run`` is what runs the plants' cycles: ``run_plain`` in real time, ``run_compiled()`` where much time is to pass.
+    """
+    settings = Settings(state_dir=state_dir, turnaround_ns=turnaround_ns, factory=factory, run=run)
+    return Turbine(line, pmm, pmc, settings)
 
 
 def _make_folder(folder: Path) -> None:
