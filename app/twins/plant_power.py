@@ -8,6 +8,7 @@ slow part rests on the number of cycles alone, so that it is the same however ti
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from enum import Enum
 from math import exp, pi, sin
 from random import Random
 from typing import Final
@@ -18,12 +19,20 @@ from app.twins.plant_battery import BLOCS, Bloc, in_series_ohm, in_series_v, ope
 from app.twins.plant_mains import Mains
 from app.twins.plant_thermal import Losses, ThermalPlant
 
-__all__ = ["BLOCS", "Bloc", "PowerCommands", "PowerConstants", "PowerPlant", "open_circuit_v"]
+__all__ = ["BLOCS", "Bloc", "PowerCommands", "PowerConstants", "PowerPlant", "Stage", "open_circuit_v"]
 
 STATE_LENGTH: Final = 160
 """Places of the state and of the parameters, those of the axis included."""
 _SLOW_CYCLES: Final = 100
 """Slow values move on every 100 ms."""
+
+
+class Stage(Enum):
+    """Power stages of the PMM."""
+
+    CHARGER = "charger"
+    BOOSTER = "booster"
+    CHOPPER = "chopper"
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +100,7 @@ class PowerCommands:
     booster_on: bool = False
     """By command or for a test, whatever the mains does."""
     booster_start_v: float = 420.0
-    booster_target_v: float | None = None
+    booster_target_v: float = 600.0
     booster_limit_a: float = 90.0
     battery_least_v: float = 162.0
     chopper_on: bool = False
@@ -122,6 +131,10 @@ class PowerPlant:
     """What else hangs on the 24 V."""
     supply_drop_v: float = 0.0
     """What is wrong with the internal 24 V."""
+    shorted: set[Stage] = field(default_factory=set)
+    """Power stages whose fault output reports a short circuit."""
+    blocs_silent: bool = False
+    """The interface to the blocs tells nothing."""
     blocs: list[Bloc] = field(default_factory=list)
     mains: Mains = field(init=False)
     thermal: ThermalPlant = field(default_factory=ThermalPlant)
@@ -178,16 +191,30 @@ class PowerPlant:
         p[k.SUPPLY_W] = self.adapter_w
         p[k.UNIT_ON] = float(commands.enabled)
         p[k.MAINS_FAILED] = float(commands.mains_failed)
-        p[k.BOOSTER_FORCED] = float(commands.booster_on or commands.booster_target_v is not None)
+        p[k.BOOSTER_FORCED] = float(commands.booster_on)
         p[k.BOOSTER_START_V] = commands.booster_start_v
-        p[k.BOOSTER_TARGET_V] = commands.booster_target_v or 600.0
+        p[k.BOOSTER_TARGET_V] = commands.booster_target_v
         p[k.BOOSTER_LIMIT_A] = commands.booster_limit_a
         p[k.BATTERY_LEAST_V] = commands.battery_least_v
         p[k.CHOPPER_FORCED] = float(commands.chopper_on)
         p[k.CHOPPER_ON_V] = commands.chopper_on_v
         p[k.CHOPPER_OFF_V] = commands.chopper_off_v
         p[k.CHARGE_A] = commands.charge_a
+        if self.shorted:
+            self._block(self.shorted)
         self._write_battery()
+
+    def _block(self, stages: set[Stage]) -> None:
+        """A power stage that reports a short circuit switches no more."""
+        p = self.p
+        if Stage.BOOSTER in stages:
+            p[k.BOOSTER_FORCED] = self.s[k.BOOSTER_ON] = 0.0
+            p[k.BOOSTER_START_V] = -1.0
+        if Stage.CHOPPER in stages:
+            p[k.CHOPPER_FORCED] = self.s[k.CHOPPER_ON] = 0.0
+            p[k.CHOPPER_ON_V] = 1e9
+        if Stage.CHARGER in stages:
+            p[k.CHARGE_A] = 0.0
 
     def settle(self) -> None:
         """Take over what the kernel counted, after it ran; the slow part moves on every 100 ms."""
@@ -333,6 +360,10 @@ class PowerPlant:
     def booster_current_limited(self) -> bool:
         """It is its current limit that does so."""
         return self.s[k.BOOSTER_GOVERNOR] == 1.0
+
+    def stop_booster(self) -> None:
+        """Off at once, not only with the next cycle."""
+        self.s[k.BOOSTER_ON] = self.s[k.BOOSTER_GOVERNOR] = self.s[k.BOOSTER_A] = 0.0
 
     # -- values: battery -------------------------------------------------------------------
 
