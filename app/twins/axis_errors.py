@@ -76,6 +76,8 @@ class AxisErrors:
         self._store = store
         self._emergency = emergency
         self._present: set[int] = set()
+        self._seen: set[int] = set()
+        """Masked errors without a lasting cause, until the reset: their flags show."""
         self._pending: dict[int, None] = {}
         self._warnings: dict[int, None] = {}
         self._reaction: Stop | None = None
@@ -83,7 +85,7 @@ class AxisErrors:
     @property
     def flags(self) -> int:
         """6510h/8: causes that stand and errors that wait for a reset."""
-        bits = (KINDS[code].bit for code in self._present | self._pending.keys())
+        bits = (KINDS[code].bit for code in self._present | self._seen | self._pending.keys())
         return sum(1 << bit for bit in bits if bit is not None)
 
     @property
@@ -118,9 +120,8 @@ class AxisErrors:
 
     def clear(self) -> None:
         """Forget what was raised, as at power-on; causes that stand will be raised again."""
-        self._pending.clear()
-        self._warnings.clear()
-        self._present.clear()
+        for known in (self._pending, self._warnings, self._present, self._seen):
+            known.clear()
         self._reaction = None
 
     def condition(self, code: int, present: bool) -> None:
@@ -135,6 +136,8 @@ class AxisErrors:
     def event(self, code: int) -> None:
         """An error without a lasting cause."""
         self._raise(code)
+        if code not in self._pending:
+            self._seen.add(code)
 
     def warning(self, code: int, present: bool) -> None:
         """A warning appears or disappears; no message is sent."""
@@ -150,9 +153,15 @@ class AxisErrors:
 
     def reset(self) -> None:
         """Fault reset: errors whose cause is gone are cleared."""
+        self._seen.clear()
         for code in [code for code in self._pending if code not in self._present]:
             del self._pending[code]
             self._emergency.clear(code)
+
+    def mask_changed(self) -> None:
+        """6510h/7 was written: a cause that stands and is masked no more is an error now."""
+        for code in sorted(self._present):
+            self._raise(code)
 
     def react_again(self) -> None:
         """Let pending errors act once more (after an EFC that went on in spite of them)."""

@@ -51,6 +51,24 @@ def blade_scaling(store: ObjectStore) -> Scaling:
     return _scaling(store, 0x687C, 0x687E, 0x688F, 0x6891, 0x6892)
 
 
+def highest_profile_velocity(store: ObjectStore) -> Fraction:
+    """What 607Fh must not exceed, in units/s: 6080h / 60 x feed constant / gear ratio (manual, 607Fh).
+
+    The feed constant is that of the encoder which 606Ah selects, the gear ratio always that of the motor: it is the
+    motor's speed which is limited. As delivered by default, 607Fh violates it with the gear of the pitch example.
+
+    OPEN what a drive does with a 607Fh beyond it. The value is taken, and 6080h limits the motor: the set-point runs
+    away from the axis then, and the following error tells.
+    """
+    feed = _ratio(store, 0x6892 if store.number(0x606A) == -1 else 0x6092)
+    return Fraction(store.number(0x6080), 60) * feed / _ratio(store, 0x6091)
+
+
+def interpolation_ms(value: int, index: int) -> Fraction:
+    """Time between two cyclic set-points by 60C2h: value x 10^index seconds, in ms."""
+    return Fraction(value) * Fraction(10) ** (index + 3)
+
+
 def _scaling(store: ObjectStore, home: int, polarity: int, resolution: int, gear: int, feed: int) -> Scaling:
     per_turn = _ratio(store, resolution)
     factor = units_per_increment(per_turn, _ratio(store, gear), _ratio(store, feed))

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
-from enum import Enum, IntFlag
+from enum import Enum, IntEnum
 from typing import Final, Protocol
 
 
@@ -36,7 +36,7 @@ class Command(Enum):
     ENABLE_OPERATION = "enable operation"
 
 
-class Control(IntFlag):
+class Control(IntEnum):
     """Bits of the controlword 6040h (table 51)."""
 
     SWITCH_ON = 1 << 0
@@ -50,7 +50,7 @@ class Control(IntFlag):
     MIRRORED = 1 << 14
 
 
-class Status(IntFlag):
+class Status(IntEnum):
     """Bits of the statusword 6041h beyond the state (table 53)."""
 
     OPERATION_ENABLED = 1 << 2
@@ -157,6 +157,7 @@ class StateMachine:
         self._autostart_armed = True
         self._enable_is_new = True
         self._feathering = False
+        self._disabling = False
         self._reaction: Stop | None = None
         self._rules = {
             State.NOT_READY: self._not_ready,
@@ -182,7 +183,7 @@ class StateMachine:
         self._switching_off = None
         self._autostart_armed = True
         self._enable_is_new = True
-        self._feathering = False
+        self._feathering = self._disabling = False
 
     def evaluate(self, t_ns: int, signals: Signals) -> None:
         """Take all transitions that are due. Edges in ``signals`` count for the state in which they arrive."""
@@ -242,7 +243,7 @@ class StateMachine:
             self._disable_operation()
         elif signals.feather:
             if not self._feathering:
-                self._feathering = True
+                self._feathering, self._disabling = True, False
                 self._axis.operate(True)
         elif not signals.enable_input or signals.command is Command.DISABLE_VOLTAGE:
             self._switch_off(9, State.SWITCH_ON_DISABLED, t_ns, signals)
@@ -251,8 +252,10 @@ class StateMachine:
             self._go(11, State.QUICK_STOP_ACTIVE)
         elif signals.command is Command.SHUTDOWN:
             self._switch_off(8, State.READY, t_ns, signals)
-        elif signals.command is Command.SWITCH_ON:
+        elif signals.command is Command.SWITCH_ON and not self._disabling:
             self._disable_operation()
+        if self._disabling and self._switching_off is None and self._axis.at_rest:
+            self._go(5, State.SWITCHED_ON)
 
     def _quick_stopping(self, t_ns: int, signals: Signals) -> None:
         if signals.feather:
@@ -275,6 +278,7 @@ class StateMachine:
     def _go(self, transition: int, state: State) -> None:
         self.history.append(transition)
         self.state = state
+        self._disabling = False
 
     def _switch_on(self) -> None:
         self._axis.switch_on()
@@ -293,11 +297,14 @@ class StateMachine:
         self._go(transition, State.OPERATION_ENABLED)
 
     def _disable_operation(self) -> None:
-        """T5. OPEN what a standing "enable" does after the 90 degree switch; it counts only when given anew."""
+        """T5: stop by the ramp; the new state shows when the axis stands.
+
+        OPEN what a standing "enable" does after the 90 degree switch; it counts only when given anew.
+        """
         self._axis.stop(Stop.RAMP)
         self._enable_is_new = False
         self._feathering = False
-        self._go(5, State.SWITCHED_ON)
+        self._disabling = True
 
     def _switch_off(self, transition: int, then: State, t_ns: int, signals: Signals) -> None:
         """Let the brake engage, switch off after its time, only then show the new state."""

@@ -1,22 +1,23 @@
-"""Twin of the OAT PMC, the axis controller: its objects, inputs, monitors and state machine (manual, chapter 5)."""
+"""Twin of the OAT PMC, the axis controller: its objects, its time and its state machine (manual, chapter 5)."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from math import pi
 from typing import Final
 
 from app.model.address import Address
 from app.model.datatypes import Raw
-from app.twins.axis_drive import AxisDrive, Mode
-from app.twins.axis_errors import SWITCH_95_CODE, AxisErrors
-from app.twins.canopen_device import MS, SECOND, Application, CanopenDevice, Power
+from app.twins.axis_drive import AxisDrive, Feedback, Mode
+from app.twins.axis_errors import KINDS, SWITCH_95_CODE, AxisErrors
+from app.twins.canopen_device import MS, Application, CanopenDevice, Power
 from app.twins.cia402 import Command, Control, Signals, State, StateMachine, Status, command_of
 from app.twins.manual_function import ManualFunction
 from app.twins.object_store import Deferred, RefusedAccessError
 from app.twins.plant import AxisPlant
 from app.twins.plant_power import PowerPlant
+from app.twins.pmc_cyclic import CyclicPeriod
+from app.twins.pmc_inputs import AxisInputs, Edges, input_word, output_word
+from app.twins.pmc_monitors import JUDGED, Monitors, motor_rpm
 from app.twins.unit_link import AxisFlag, AxisReport, SupplyReport, UnitLink
 from app.wire.nmt import NmtState
 from app.wire.sdo import Abort
@@ -25,32 +26,21 @@ TICK_BUSY_NS: Final = 5 * MS
 """How often it is called while the axis needs its cycles."""
 TICK_IDLE_NS: Final = 20 * MS
 _CYCLE_NS: Final = MS
-_TEMPERATURE_ALERT_NS: Final = 30 * SECOND
-"""Table 48: the motor is turned off 30 s after the alert."""
 _ENCODER_CODES: Final = frozenset((0x7300, 0x7305, 0x7320))
 _BLADE_ENCODER_CODES: Final = frozenset((0x7300, 0x7321))
 """Errors with which the position by that encoder is not to be trusted."""
 _AUTOSTART: Final = 1 << 0
 _BEYOND_SWITCHES: Final = 1 << 14
 """60FBh/3: the axis may pass limit switches while the node is not operational."""
-_OVERSPEED_SHARE: Final = 1.2
-"""8400h; its threshold is not printed, 20 % above 6080h is taken."""
-_SCALING_OBJECTS: Final = frozenset(
-    (0x607C, 0x607E, 0x608F, 0x6091, 0x6092, 0x606A, 0x6065, 0x6066, 0x6067, 0x6068, 0x60F6, 0x60F9, 0x60FB, 0x6073, 0x6080)
-)
+_FEATHER_BY_VELOCITY: Final = 1 << 9
+"""60FBh/3: an EFC drives to the 90 degree switch under velocity control."""
+_MODE_BITS: Final = 1 << 5 | 1 << 6 | 1 << 9
+"""Bits of the controlword that mode 1 has no use for: change on the fly, relative position (5.10.1)."""
+_CYCLIC: Final = (Mode.CYCLIC_POSITION, Mode.CYCLIC_VELOCITY)
+_WATCHDOG_RESET: Final = 0x6010
+_MONITORED: Final = (0x6065, 0x6066, 0x6067, 0x6068, 0x60F6, 0x60F9, 0x60FB, 0x6073, 0x6080)
+_SCALING_OBJECTS: Final = frozenset((0x607C, 0x607E, 0x608F, 0x6091, 0x6092, 0x606A, *_MONITORED))
 _BLADE_SCALING_OBJECTS: Final = frozenset((0x687C, 0x687E, 0x688F, 0x6891, 0x6892))
-
-
-@dataclass(slots=True)
-class AxisInputs:
-    """Levels at the clamps that no part of the plant drives (table 72); ``efc`` and ``enable``: True is healthy."""
-
-    enable: bool = True
-    efc: bool = True
-    reference: bool = False
-    probe: bool = False
-    reset: bool = False
-    free: bool = False
 
 
 class OatPmc(Application):
@@ -60,27 +50,32 @@ class OatPmc(Application):
         device.application = self
         self.device = device
         self.plant = plant
-        self.inputs = AxisInputs()
+        self.inputs = AxisInputs(self._probe_changed)
         self._power = power
         self._store = device.store
         self.errors = AxisErrors(self._store, device.emergency)
         self.drive = AxisDrive(self._store, plant)
+        self.monitors = Monitors(self._store, plant, power, self.drive, self.errors)
         self.machine = StateMachine(self.drive)
+        self.link: UnitLink[SupplyReport] | None = None
+        self.manual = ManualFunction(self._store, self._sent_manual, self._reset_by_object)
+        self._edges = Edges(plant, self.drive, self.inputs)
+        self._period = CyclicPeriod(self._store)
+        self._booted = False
+        self._restart_code = 0
+        self._last_ns = 0
+        self._forget()
+        self._bind_values()
+        self._bind_commands()
+
+    def _forget(self) -> None:
+        """What does not outlast a restart."""
         self._controlword = 0
         self._commanded = False
         self._forced: Command | None = None
-        self.link: UnitLink[SupplyReport] | None = None
-        self.manual = ManualFunction(self._store, self._sent_manual, self._reset_by_object)
-        self._booted = False
-        self._last_ns = 0
-        self._was_0 = self._was_90 = self._was_95 = False
-        self._was_reset_input = self._was_probe = self._was_feather = False
-        self._hit_0 = self._hit_90 = self._reset_edge = False
         self._homed = self._homing_error = False
-        self._hot_since_ns: dict[int, int] = {}
-        self._differs_since_ns = 0
-        self._bind_values()
-        self._bind_commands()
+        self._mode_is_new = True
+        self._was_feather = False
 
     # -- application of the mount ---------------------------------------------------
 
@@ -90,46 +85,41 @@ class OatPmc(Application):
 
     def restarted(self, t_ns: int) -> None:
         """T0: output stage off, brake engaged; the blade stays where it is."""
-        self._booted = False
-        self._controlword = 0
-        self.manual.clear()
+        self.powered_off()
+        self.drive.refresh()
+        self.drive.refresh_blade()
+        self._edges.restart()
+        self.monitors.restart(t_ns)
+
+    def booted(self, t_ns: int) -> None:
+        """T1. A restart that was no wish is told now."""
+        self._booted = True
+        self._evaluate(t_ns)
         if self.link is not None:
-            self.link.stop()
-        self._commanded, self._forced = False, None
-        self._homed = self._homing_error = False
-        self._hit_0 = self._hit_90 = self._reset_edge = False
-        self._hot_since_ns.clear()
+            self.link.start(t_ns)
+        if self._restart_code:
+            code, self._restart_code = self._restart_code, 0
+            self.raise_error(code)
+
+    def powered_off(self) -> None:
+        """Output stage, brake and watchdog contact fall off; nothing in RAM is left."""
+        self._booted = False
+        self._forget()
+        self._edges.forget()
+        self._period.restart()
+        self.manual.clear()
         self.errors.clear()
         self.drive.switch_off()
         self.drive.watchdog(False)
         self.drive.halted = False
         self.drive.set_mode(Mode.NONE)
-        self.drive.refresh()
-        self.drive.refresh_blade()
-        self.machine.reset()
-        self._was_0, self._was_90, self._was_95 = self.plant.at_0, self.plant.at_90, self.plant.at_95
-        self._differs_since_ns = t_ns
-
-    def booted(self, t_ns: int) -> None:
-        """T1."""
-        self._booted = True
-        self._evaluate(t_ns)
-        if self.link is not None:
-            self.link.start(t_ns)
-
-    def powered_off(self) -> None:
-        """Output stage, brake and watchdog contact fall off."""
-        self._booted = False
-        self.drive.switch_off()
-        self.drive.watchdog(False)
         self.machine.reset()
         if self.link is not None:
             self.link.stop()
 
     def communication_error(self, code: int) -> None:
         """8130h and its like; what the axis does is for 6007h to say."""
-        self.errors.event(code)
-        self._evaluate(self.device.line.now_ns)
+        self.raise_error(code)
 
     def nmt_changed(self, state: NmtState, t_ns: int) -> None:
         """A stopped node has lost its connection too (CiA 402, 6007h), though nothing failed that could be reported."""
@@ -137,6 +127,27 @@ class OatPmc(Application):
             self._commanded = True
             self._forced = Command.DISABLE_VOLTAGE if self._store.number(0x6007) == 2 else Command.QUICK_STOP
             self._evaluate(t_ns)
+
+    def synchronised(self, t_ns: int) -> None:
+        """A SYNC came."""
+        self._period.synchronised(t_ns)
+
+    # -- errors from around it ---------------------------------------------------------------
+
+    def raise_error(self, code: int) -> None:
+        """An error of table 6 without a lasting cause, or with one that no part of the plant can show (2320h, 6080h).
+
+        Raises ValueError where the PMC has no such error.
+        """
+        if code not in KINDS:
+            raise ValueError(f"the PMC has no error {code:04X}h")
+        self.errors.event(code)
+        self._evaluate(self.device.line.now_ns)
+
+    def watchdog_reset(self) -> None:
+        """The processor's watchdog strikes: the unit restarts, which turns the motor off, and tells 6010h then."""
+        self._restart_code = _WATCHDOG_RESET
+        self.device.power_on(self.device.line.now_ns)
 
     # -- safety chain and link to the PMM --------------------------------------------------
 
@@ -146,12 +157,12 @@ class OatPmc(Application):
 
     @property
     def watchdog_closed(self) -> bool:
-        """The contact X2.1/X2.2 (60FEh/3 bit 16).
+        """The contact X2.1/X2.2 (60FEh/3 bit 16): opened by every error, also by one that is a message only.
 
         It stays open while an error is pending, even where an EFC left the fault (T15): else the chain that this error
         opened would close again by it, and end the EFC.
         """
-        return self.drive.watchdog_closed and not self.errors.stops and self.device.power is not Power.OFF
+        return self.drive.watchdog_closed and not self.errors.pending and self.device.power is not Power.OFF
 
     def _report(self) -> AxisReport:
         drive, store = self.drive, self._store
@@ -180,16 +191,20 @@ class OatPmc(Application):
 
     def tick(self, t_ns: int) -> None:
         """Move axis, supply and monitors on to ``t_ns``."""
-        while (cycles := (t_ns - self._last_ns) // _CYCLE_NS) > 0:
-            self._last_ns += self.drive.advance(cycles) * _CYCLE_NS
-            if self._look_at_switches():
-                self._evaluate(self._last_ns)
+        self._run_cycles(t_ns)
         self._look_at_switches()
-        self._monitor(t_ns)
+        if self._booted:
+            self.monitors.look(t_ns)
         if self.machine.feathering:
             self.drive.feather_on()
         self._evaluate(t_ns)
         self.device.poll(t_ns)
+
+    def _run_cycles(self, t_ns: int) -> None:
+        while (cycles := (t_ns - self._last_ns) // _CYCLE_NS) > 0:
+            self._last_ns += self.drive.advance(cycles) * _CYCLE_NS
+            if self._look_at_switches():
+                self._evaluate(self._last_ns)
 
     # -- state machine -----------------------------------------------------------------
 
@@ -201,26 +216,43 @@ class OatPmc(Application):
         reaction = self.errors.take_reaction()
         if feather and not self.errors.blocks_feather:
             reaction = None  # an EFC is driven with another error pending, as far as it can be
-        if self._reset_edge and self.machine.state is not State.FAULT_REACTION_ACTIVE:
+        edges = self._edges
+        if edges.reset and self.machine.state is not State.FAULT_REACTION_ACTIVE:
             self.errors.reset()
         signals = Signals(
             booted=self._booted,
             enable_input=self.inputs.enable,
             command=self._command_in_force(),
             feather=feather,
-            hit_0=self._hit_0,
-            hit_90=self._hit_90,
+            hit_0=edges.hit_0,
+            hit_90=edges.hit_90,
             fault=reaction,
-            reset=self._reset_edge,
+            reset=edges.reset,
             errors_gone=self.errors.gone,
             autostart=bool(self._store.number(0x60FB, 3) & _AUTOSTART),
             brake_time_ns=self._store.number(0x60F9, 4) * MS,
         )
-        self._hit_0 = self._hit_90 = self._reset_edge = False
+        edges.forget()
+        self.drive.feedback = self._feedback(feather)
         self.machine.evaluate(t_ns, signals)
         self.drive.halted = bool(self._controlword & Control.HALT) and not self.machine.feathering
+        if self.machine.state is State.OPERATION_ENABLED and not self.drive.halted:
+            self._mode_is_new = False
+
+    def _feedback(self, feather: bool) -> Feedback:
+        """What an axis is controlled with that drives to feather, or is stopped, in spite of an encoder error.
+
+        OPEN which of the two ways the text below table 50 means when: the additional encoder where it has a position
+        of its own, else speed control without encoder; this also where 60FBh/3 bit 9 demands it of an EFC.
+        """
+        flags = self._store.number(0x60FB, 3)
+        if feather and flags & _FEATHER_BY_VELOCITY:
+            return Feedback.NONE
+        normal = self.machine.state is State.OPERATION_ENABLED and not feather
+        return Feedback.MOTOR_ENCODER if normal else self.monitors.feedback
 
     def _feather_wanted(self) -> bool:
+        """OPEN which is stronger, an EFC or a missing enable input; the input, for it is there to keep a motor off."""
         asked = not self.inputs.efc or bool(self._controlword & Control.EFC)
         reached = self.plant.at_90 or self.plant.at_95
         return asked and not reached and self._booted and self.inputs.enable and not self.errors.blocks_feather
@@ -240,7 +272,7 @@ class OatPmc(Application):
         before, self._controlword = self._controlword, word
         self._commanded, self._forced = True, None
         rising = word & ~before
-        self._reset_edge = bool(rising & Control.FAULT_RESET) and self._remote()
+        self._edges.reset = self._edges.reset or (bool(rising & Control.FAULT_RESET) and self._remote())
         self._evaluate(self.device.line.now_ns)
         if not self._remote():
             return None
@@ -251,10 +283,15 @@ class OatPmc(Application):
         return None
 
     def _new_set_point(self) -> None:
+        """OPEN what happens with bits 5, 6 or 9, which must be 0; such a target is not taken, bit 12 stays 0.
+
+        To drive to it all the same would be a motion to elsewhere than its master believes.
+        """
         if self.drive.mode is Mode.HOMING:
-            self._homed = self.drive.set_home()
+            self._homed = self.drive.at_rest and self.drive.set_home()
             self._homing_error = not self._homed
-        elif not self.machine.feathering:
+        elif not self.machine.feathering and not self._controlword & _MODE_BITS:
+            self._mode_is_new = False
             self.drive.new_set_point()
 
     def statusword(self) -> int:
@@ -269,120 +306,71 @@ class OatPmc(Application):
             word |= Status.REMOTE
         if drive.limit_active:
             word |= Status.INTERNAL_LIMIT
-        if drive.mode is Mode.HOMING:
-            done = self._homed or self._homing_error
-            return int(word | self._mode_bits(done, self._homed, self._homing_error))
-        acknowledged = {
-            Mode.PROFILE_POSITION: drive.targets.acknowledged,
-            Mode.PROFILE_VELOCITY: drive.profile.velocity == 0,
-            Mode.CYCLIC_POSITION: drive.follows,
-            Mode.CYCLIC_VELOCITY: drive.follows,
-        }.get(drive.mode, False)
-        watched = drive.mode in (Mode.PROFILE_POSITION, Mode.CYCLIC_POSITION)
-        return int(word | self._mode_bits(drive.target_reached, acknowledged, watched and drive.following_exceeded))
+        if self._target_reached():
+            word |= Status.TARGET_REACHED
+        bit_12, bit_13 = self._mode_bits()
+        return int(word | (Status.MODE_12 if bit_12 else 0) | (Status.MODE_13 if bit_13 else 0))
 
-    @staticmethod
-    def _mode_bits(reached: bool, bit_12: bool, bit_13: bool) -> int:
-        return int(
-            (Status.TARGET_REACHED if reached else 0)
-            | (Status.MODE_12 if bit_12 else 0)
-            | (Status.MODE_13 if bit_13 else 0)
-        )
+    def _mode_bits(self) -> tuple[bool, bool]:
+        """Bits 12 and 13 (table 54)."""
+        drive = self.drive
+        match drive.mode:
+            case Mode.PROFILE_POSITION:
+                return drive.targets.acknowledged, drive.following_exceeded
+            case Mode.PROFILE_VELOCITY:
+                return drive.profile.velocity == 0, False
+            case Mode.HOMING:
+                return self._homed, self._homing_error
+            case Mode.CYCLIC_POSITION:
+                return drive.follows, drive.following_exceeded
+            case Mode.CYCLIC_VELOCITY:
+                return drive.follows, False
+            case _:
+                return False, False
 
-    # -- inputs and monitors --------------------------------------------------------------
+    def _target_reached(self) -> bool:
+        """Bit 10 (below table 53): a target reached, a new mode, or halted and at rest; always in the cyclic modes.
+
+        OPEN what it shows in a cyclic mode under halt; as in the rest of these modes, where nobody evaluates it. In
+        homing mode it is set by the choice of the mode, and the one command takes no time.
+        """
+        if self.drive.mode in (*_CYCLIC, Mode.HOMING):
+            return True
+        if self._controlword & Control.HALT and not self.machine.feathering:
+            return self.drive.at_rest
+        return self._mode_is_new or self.drive.target_reached
+
+    # -- inputs and outputs --------------------------------------------------------------
 
     def digital_inputs(self) -> int:
-        """60FDh (table 72)."""
-        levels = {
-            0: not self.plant.at_0,
-            1: not self.plant.at_95,
-            2: self.inputs.reference,
-            3: self.inputs.enable,
-            16: self.plant.at_90,
-            17: self.inputs.probe,
-            18: self.inputs.efc,
-            19: self.inputs.reset,
-            20: self.inputs.free,
-        }
-        return sum(1 << bit for bit, level in levels.items() if level)
+        """60FDh."""
+        return input_word(self.plant, self.inputs)
 
     def digital_outputs(self) -> int:
-        """60FEh/3 (table 73): brake, watchdog contact, LEDs of device and failure, watchdog and field bus."""
+        """60FEh/3."""
         fault = self.machine.state in (State.FAULT, State.FAULT_REACTION_ACTIVE)
         operational = self.device.state is NmtState.OPERATIONAL
-        levels = {
-            0: self.plant.brake_lifted,
-            16: self.watchdog_closed,
-            24: self._booted,
-            25: fault,
-            26: self.watchdog_closed,
-            27: operational,
-        }
-        return sum(1 << bit for bit, level in levels.items() if level)
+        closed = self.watchdog_closed
+        return output_word(self.plant, watchdog=closed, booted=self._booted, fault=fault, operational=operational)
 
     def _look_at_switches(self) -> bool:
         """Note edges of switches and inputs; True where the state machine has to see one."""
-        plant, inputs = self.plant, self.inputs
         flags = self._store.number(0x60FB, 3)
         beyond = bool(flags & _BEYOND_SWITCHES) and self.device.state is not NmtState.OPERATIONAL
-        if plant.at_0 and not self._was_0 and not beyond:
-            self._hit_0 = True
-        if plant.at_90 and not self._was_90 and not beyond:
-            self._hit_90 = True
+        changed = self._edges.look(beyond)
         # OPEN whether the 95 degree error can be reset while the switch is actuated; it cannot, bit 14 leads out.
-        self.errors.condition(SWITCH_95_CODE, plant.at_95 and not beyond)
-        changed = (plant.at_0, plant.at_90, plant.at_95) != (self._was_0, self._was_90, self._was_95)
-        self._was_0, self._was_90, self._was_95 = plant.at_0, plant.at_90, plant.at_95
-        if inputs.reset and not self._was_reset_input:
-            self._reset_edge = changed = True
-        self._was_reset_input = inputs.reset
-        if inputs.probe != self._was_probe:
-            self._store.cell(0x60BA if inputs.probe else 0x60BB).raw = round(self.drive.position)
-            self._was_probe = inputs.probe
+        self.errors.condition(SWITCH_95_CODE, self.plant.at_95 and not beyond)
         if self.drive.following_tripped:
             self.drive.following_tripped = False
             self.errors.event(0x8611)
             changed = True
         return changed
 
-    def _monitor(self, t_ns: int) -> None:
-        if not self._booted:
-            return
-        store, power, errors = self._store, self._power, self.errors
-        errors.condition(0x3220, power.dc_link_v < store.number(0x6510, 4))
-        errors.condition(0x3210, power.dc_link_v > store.number(0x6510, 5))
-        self._watch_difference(t_ns)
-        highest = store.number(0x6080) * _OVERSPEED_SHARE
-        errors.condition(0x8400, abs(self._motor_rpm()) > highest)
-        self._watch_temperature(0x4210, power.heat_sink_c, store.number(0x6510, 6), store.number(0x6510, 2), t_ns)
-        self._watch_temperature(0x4310, power.motor_c, store.number(0x6410, 8), store.number(0x6410, 7), t_ns)
-
-    def _watch_difference(self, t_ns: int) -> None:
-        """8620h: the encoders differ by more than 6865h for longer than 6866h ms.
-
-        OPEN what a window of 0 (its default) means; no monitoring, for literally every twin would fail at once.
-        """
-        window = self._store.number(0x6865)
-        difference = abs(self.drive.motor_position - self.drive.blade_position)
-        if not window or difference <= window:
-            self._differs_since_ns = t_ns
-        self.errors.condition(0x8620, t_ns - self._differs_since_ns > self._store.number(0x6866) * MS)
-
-    def _watch_temperature(self, code: int, temperature_c: float, warning: int, highest: int, t_ns: int) -> None:
-        """Warning at its level; error 30 s after the maximum. OPEN from where the 30 s count.
-
-        From the maximum: from the warning level, a warm day would end in a motor that cannot drive to feather.
-        """
-        tenths = temperature_c * 10
-        self.errors.warning(code, tenths >= warning)
-        if tenths < highest:
-            self._hot_since_ns.pop(code, None)
-            self.errors.condition(code, False)
-        elif t_ns - self._hot_since_ns.setdefault(code, t_ns) >= _TEMPERATURE_ALERT_NS:
-            self.errors.condition(code, True)
-
-    def _motor_rpm(self) -> float:
-        return self.plant.speed_rad_s * 60 / (2 * pi)
+    def _probe_changed(self) -> None:
+        """The measuring input rose or fell: keep the position of the latest cycle (60BAh, 60BBh)."""
+        if self._booted:
+            self._run_cycles(self.device.line.now_ns)
+            self._store.cell(0x60BA if self.inputs.probe else 0x60BB).raw = round(self.drive.position)
 
     # -- objects ---------------------------------------------------------------------------
 
@@ -392,7 +380,7 @@ class OatPmc(Application):
         sources: dict[Address, Callable[[], Raw]] = {
             Address(0x603F): lambda: self.errors.code,
             Address(0x6041): self.statusword,
-            Address(0x6044): lambda: round(self._motor_rpm()),
+            Address(0x6044): lambda: round(motor_rpm(self.plant)),
             Address(0x6061): lambda: drive.mode.value,
             Address(0x6064): lambda: round(drive.position),
             Address(0x606C): lambda: round(drive.velocity),
@@ -403,6 +391,7 @@ class OatPmc(Application):
             Address(0x60FD): self.digital_inputs,
             Address(0x60FE, 3): self.digital_outputs,
             Address(0x6410, 9): lambda: round(power.motor_c * 10),
+            Address(0x6510, 1): lambda: self.monitors.power_stage,
             Address(0x6510, 3): lambda: round(power.heat_sink_c * 10),
             Address(0x6510, 8): lambda: self.errors.flags,
             Address(0x6864): lambda: round(drive.blade_position),
@@ -419,6 +408,12 @@ class OatPmc(Application):
         store.cell(0x6060).guard = self._check_mode
         store.cell(0x6060).effect = self._on_mode
         store.cell(0x606A).guard = self._only_at_rest
+        store.cell(0x60FF).effect = self._on_velocity
+        store.cell(0x6510, 7).effect = self._on_mask
+        for sub in (1, 2):
+            store.cell(0x60C2, sub).guard = self._period_guard(sub)
+        for index, sub in JUDGED:
+            store.cell(index, sub).effect = self._on_judged
         for cell in store:
             if cell.effect is None and cell.entry.address.major in _SCALING_OBJECTS:
                 cell.effect = self._refresh
@@ -440,11 +435,28 @@ class OatPmc(Application):
         enabled = self._controlword & Control.ENABLE_OPERATION or self.statusword() & Status.OPERATION_ENABLED
         if enabled and raw not in (0, self.drive.mode.value):
             raise RefusedAccessError(Abort.DEVICE_STATE)
+        if raw in {mode.value for mode in _CYCLIC}:
+            self._period.check_mode(self.device.line.now_ns)
 
     def _on_mode(self, raw: Raw) -> None:
         if isinstance(raw, int) and raw not in (0, self.drive.mode.value):  # 0: no change
             self._homed = self._homing_error = False
+            self._mode_is_new = True
             self.drive.set_mode(Mode(raw))
+
+    def _on_velocity(self, _raw: Raw) -> None:
+        """A new target of mode 3."""
+        self._mode_is_new = False
+
+    def _period_guard(self, sub: int) -> Callable[[Raw], None]:
+        return lambda raw: self._period.check(sub, raw, self.drive.mode in _CYCLIC, self.device.line.now_ns)
+
+    def _on_mask(self, _raw: Raw) -> None:
+        self.errors.mask_changed()
+        self._evaluate(self.device.line.now_ns)
+
+    def _on_judged(self, _raw: Raw) -> None:
+        self.monitors.judge()
 
     def _only_at_rest(self, _raw: Raw) -> None:
         if not self.drive.at_rest:
@@ -452,7 +464,7 @@ class OatPmc(Application):
 
     def _reset_by_object(self) -> None:
         """Bit 7 of 5040h; it counts while the EFC input controls too, when the controlword does not."""
-        self._reset_edge = True
+        self._edges.reset = True
         self._evaluate(self.device.line.now_ns)
 
 

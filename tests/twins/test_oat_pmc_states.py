@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from app.twins.cia402 import State
+from app.twins.plant import EncoderFault
 from app.wire.nmt import NmtCommand
 from tests.twins.harness import MS
 from tests.twins.oat_rig import (
@@ -300,7 +301,7 @@ def test_lost_heartbeat_reaction(option: int, state: State, codes: list[int]) ->
 @pytest.mark.rule("M4")
 def test_masked_errors_and_priority_a(rig: BladeRig) -> None:
     rig.put("6510:07", 0)
-    rig.pmc.errors.condition(0x7305, True)
+    rig.blade.axis.encoder_fault = EncoderFault.SINE_COSINE
     rig.master.run(50 * MS)
     assert rig.state() is State.READY
     assert rig.get("6510:08") == 1 << 4
