@@ -89,6 +89,9 @@ class Application:
     def nmt_changed(self, state: NmtState, t_ns: int) -> None:
         """The node is now in ``state``."""
 
+    def synchronised(self, t_ns: int) -> None:
+        """A SYNC came."""
+
 
 class CanopenDevice:
     """One node. Build it, set ``application``, then call ``power_on``."""
@@ -274,7 +277,10 @@ class CanopenDevice:
             cell.effect = lambda _raw: self._route()
 
     def _on_sync(self, can: Can, t_ns: int) -> None:
-        if not can.remote and self.state is NmtState.OPERATIONAL:
+        if can.remote:
+            return
+        self.application.synchronised(t_ns)
+        if self.state is NmtState.OPERATIONAL:
             self._pdo.synchronise(t_ns)
 
     def _on_sdo(self, can: Can, t_ns: int) -> None:

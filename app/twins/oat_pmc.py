@@ -38,6 +38,7 @@ _MODE_BITS: Final = 1 << 5 | 1 << 6 | 1 << 9
 """Bits of the controlword that mode 1 has no use for: change on the fly, relative position (5.10.1)."""
 _CYCLIC: Final = (Mode.CYCLIC_POSITION, Mode.CYCLIC_VELOCITY)
 _WATCHDOG_RESET: Final = 0x6010
+_MEMORY_FAILED: Final = 0x5530
 _MONITORED: Final = (0x6065, 0x6066, 0x6067, 0x6068, 0x60F6, 0x60F9, 0x60FB, 0x6073, 0x6080)
 _SCALING_OBJECTS: Final = frozenset((0x607C, 0x607E, 0x608F, 0x6091, 0x6092, 0x606A, *_MONITORED))
 _BLADE_SCALING_OBJECTS: Final = frozenset((0x687C, 0x687E, 0x688F, 0x6891, 0x6892))
@@ -127,6 +128,10 @@ class OatPmc(Application):
             self._commanded = True
             self._forced = Command.DISABLE_VOLTAGE if self._store.number(0x6007) == 2 else Command.QUICK_STOP
             self._evaluate(t_ns)
+
+    def memory_failed(self, t_ns: int) -> None:
+        """The EEPROM could not be written."""
+        self.raise_error(_MEMORY_FAILED)
 
     def synchronised(self, t_ns: int) -> None:
         """A SYNC came."""
