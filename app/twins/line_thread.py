@@ -97,6 +97,10 @@ class LineThread:
         """The time of the line as it should be now."""
         return self.monotonic_ns() - self.offset_ns
 
+    def catch_up(self) -> None:
+        """Let the line come to the present: what is done to it next is done now, not at its last step."""
+        self._step_line()
+
     def on_readable(self, sock: socket.socket, function: Callable[[], None] | None) -> None:
         """Call ``function`` whenever ``sock`` is readable; None ends that."""
         self._set(self._readers, sock, function)
