@@ -112,8 +112,8 @@ class Bench:
 
     def show(self, connection: Connection) -> None:
         """Have ``connection``, which is open, as the one that is served."""
-        self.twins = TwinWatch(connection.targets, connection.buses)
         self.connection = connection
+        self.twins = TwinWatch(connection.targets, connection.buses, self.instructor is not None)
         self.epoch += 1
 
     async def consent(self, person: str) -> None:

@@ -96,12 +96,14 @@ class LinkLine:
 class TwinWatch:
     """Whether all devices of a connection are simulated, by what they say themselves. For one thread.
 
+    ``ours``: this server has started them, so they need not say it.
     A restart makes a device's name unknown until somebody reads it again; until then what it said last is held. It is
     not held over a gap, nor from one connection to the next: another bus may be connected since.
     """
 
-    def __init__(self, targets: Iterable[Target], buses: Mapping[str, Bus]) -> None:
+    def __init__(self, targets: Iterable[Target], buses: Mapping[str, Bus], ours: bool = False) -> None:
         self._targets = tuple(targets)
+        self._ours = ours
         self._buses = buses
         self._said: dict[str, tuple[bool, int]] = {}
 
@@ -109,7 +111,7 @@ class TwinWatch:
         """True where each device says, or said last, that it is simulated. To be asked a few times a second."""
         statuses = {name: bus.status for name, bus in self._buses.items()}
         answers = [self._is_twin(target, statuses[target.device.bus]) for target in self._targets]
-        return bool(answers) and all(answers)
+        return self._ours or (bool(answers) and all(answers))
 
     def _is_twin(self, target: Target, status: DriverStatus) -> bool:
         view = target.live.value(target.device.bus, target.node, DEVICE_NAME)

@@ -57,6 +57,12 @@ const settingsRoute = createRoute({
   component: lazyRouteComponent(() => import("./pages/settings/SettingsPage"), "SettingsPage"),
 });
 
+const instructorRoute = createRoute({
+  getParentRoute: () => rootRoute,
+  path: "/instructor",
+  component: lazyRouteComponent(() => import("./pages/instructor/InstructorPage"), "InstructorPage"),
+});
+
 export const router = createRouter({
   routeTree: rootRoute.addChildren([
     overviewRoute,
@@ -67,6 +73,7 @@ export const router = createRouter({
     busRoute,
     proceduresRoute,
     settingsRoute,
+    instructorRoute,
   ]),
   parseSearch,
   stringifySearch,

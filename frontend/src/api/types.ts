@@ -34,6 +34,7 @@ export type RecordingStatus = Schemas["RecordingLine"];
 export type NodeData = Schemas["NodeLine"];
 export type AxisData = Schemas["AxisLine"];
 export type RotorData = Schemas["RotorLine"];
+export type InstructorData = Schemas["InstructorLine"];
 export type ValuesData = Schemas["ValuesData"];
 export type ValueData = Schemas["ValueCell"];
 export type EventData = Schemas["EventLine"];

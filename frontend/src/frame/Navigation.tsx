@@ -6,13 +6,15 @@ import {
   IconLayoutDashboard,
   IconMovie,
   IconRotateClockwise2,
+  IconSchool,
   IconSettings,
   IconTopologyBus,
 } from "@tabler/icons-react";
 import { Link } from "@tanstack/react-router";
+import { useInstructor } from "../live/live";
 import { useTexts } from "../texts/texts";
 import classes from "./Frame.module.css";
-import { type RoomPath, ROOMS } from "./rooms";
+import { INSTRUCTOR, type RoomPath, ROOMS } from "./rooms";
 import { roomSearch } from "./search";
 
 const ICONS: Record<RoomPath, Icon> = {
@@ -24,14 +26,17 @@ const ICONS: Record<RoomPath, Icon> = {
   "/bus": IconTopologyBus,
   "/procedures": IconChecklist,
   "/settings": IconSettings,
+  "/instructor": IconSchool,
 };
 
 /** The rooms; the device and the blade that one is about go along. */
 export function Navigation() {
   const t = useTexts();
+  const ours = useInstructor()?.available === true;
+  const rooms = ROOMS.filter(({ path }) => ours || path !== INSTRUCTOR);
   return (
     <nav className={classes.rooms} aria-label={t("page.rooms.label")}>
-      {ROOMS.map(({ path, name }) => {
+      {rooms.map(({ path, name }) => {
         const RoomIcon = ICONS[path];
         return (
           <Link
@@ -39,6 +44,7 @@ export function Navigation() {
             to={path}
             search={roomSearch}
             className={classes.room}
+            data-twin={path === INSTRUCTOR}
             activeOptions={{ exact: true, includeSearch: false }}
           >
             <RoomIcon size={22} aria-hidden />

@@ -18,6 +18,7 @@ import { Sparkline } from "../ui/Sparkline";
 import { clock, megabytes } from "../ui/format";
 import { ConnectMenu } from "./ConnectMenu";
 import classes from "./Frame.module.css";
+import { InstructorMark } from "./InstructorMark";
 import { StopButtons } from "./StopButtons";
 import { UserMenu } from "./UserMenu";
 import { usePageSearch } from "./search";
@@ -32,6 +33,7 @@ export function TopBar() {
       <ModeBadge mode={link?.mode ?? "none"} connected={link?.state === "connected"} />
       <BusFacts link={link} />
       <RecordingLight link={link} />
+      <InstructorMark />
       <div className={classes.spacer} />
       <Tools />
       <UserMenu />

@@ -1,4 +1,7 @@
-/** The rooms of the page: where each is, and the last part of the key of its name. */
+/**
+ * The rooms of the page: where each is, and the last part of the key of its name. The instructor's is shown only where
+ * the server has started the twins that are connected.
+ */
 export const ROOMS = [
   { path: "/", name: "overview" },
   { path: "/axis", name: "axis" },
@@ -8,6 +11,9 @@ export const ROOMS = [
   { path: "/bus", name: "bus" },
   { path: "/procedures", name: "procedures" },
   { path: "/settings", name: "settings" },
+  { path: "/instructor", name: "instructor" },
 ] as const;
+
+export const INSTRUCTOR = "/instructor";
 
 export type RoomPath = (typeof ROOMS)[number]["path"];

@@ -6,7 +6,7 @@ const LOOKS =
 const ABOUT = "device=wtg-07/blade-2/pmc&blade=2";
 const OWN =
   "q=temp&only=changed&view=side&review=open&closed=a,b&sort=-name&hide=unit&edit=3110:01&span=120&file=a.mcap&find=x" +
-  "&order=-size&less=hash&compare=different&procedure=back_up&section=users&person=a&kind=write&tab=nodes&nodes=1,2" +
+  "&order=-size&less=hash&compare=different&node=12&set=percent:30&scenario=mains_failure&procedure=back_up&section=users&person=a&kind=write&tab=nodes&nodes=1,2" +
   "&services=sdo&ids=18B&data=40&dir=tx&errors=1&paused=1&frame=1750000000000000000";
 const everything = (): PageSearch => readSearch(parseSearch(`${LOOKS}&${ABOUT}&${OWN}`));
 

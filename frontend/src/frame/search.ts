@@ -43,6 +43,11 @@ export interface PageSearch {
   less?: string;
   /** "different" shows of a set only what differs from the device now. */
   compare?: "different";
+  /** What the instructor's room is about to inject: node, and values that are not the defaults ("percent:30;for:10"). */
+  node?: string;
+  set?: string;
+  /** The scenario that is open. */
+  scenario?: string;
   /** The procedure that is open. */
   procedure?: string;
   /** Filter and least severity of the event drawer, and whether it is "tall". */
@@ -82,6 +87,9 @@ const TEXTS = [
   "find",
   "order",
   "less",
+  "node",
+  "set",
+  "scenario",
   "procedure",
   "eventq",
   "severity",

@@ -34,6 +34,7 @@ export const useLink = () => useTopic("link", () => store.link);
 export const useNodes = () => useTopic("nodes", () => store.nodes);
 export const useAxes = () => useTopic("axes", () => store.axes);
 export const useRotor = () => useTopic("rotor", () => store.rotor);
+export const useInstructor = () => useTopic("instructor", () => store.instructor);
 export const useEvents = () => useTopic("events", () => store.events);
 export const useLoadHistory = () => useTopic("link", () => store.loadHistory);
 

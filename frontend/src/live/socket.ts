@@ -14,7 +14,7 @@ const CHECK_MS = 100;
 const GIVE_UP_MS = 3000;
 /** Code with which the server closes the socket of a session that has ended. */
 const SIGNED_OUT = 4401;
-const BASE_TOPICS = ["link", "nodes", "axes", "rotor", "events"];
+const BASE_TOPICS = ["link", "nodes", "axes", "rotor", "instructor", "events"];
 
 export class LiveSocket {
   private readonly url: string;

@@ -3,12 +3,13 @@
  *
  * Messages are taken in at once but shown coalesced: listeners of a topic are told at most once a tick of `schedule`
  * (an animation frame in the browser), however many messages came. Topics: "hearing", "bench", "link", "nodes", "axes",
- * "rotor", "events", "device:<slug>" and "value:<slug>/<address>".
+ * "rotor", "instructor", "events", "device:<slug>" and "value:<slug>/<address>".
  */
 import type {
   AxisData,
   BenchData,
   EventData,
+  InstructorData,
   LinkData,
   NodeData,
   RotorData,
@@ -46,6 +47,7 @@ export class LiveStore {
   nodes: ReadonlyMap<string, NodeData> = new Map();
   axes: ReadonlyMap<number, AxisData> = new Map();
   rotor: RotorData | null = null;
+  instructor: InstructorData | null = null;
   events: readonly NumberedEvent[] = [];
   loadHistory: readonly number[] = [];
   readonly traces = new Map<number, Trace>();
@@ -119,6 +121,9 @@ export class LiveStore {
       case "rotor":
         this.rotor = message.data;
         return this.mark("rotor");
+      case "instructor":
+        this.instructor = message.data;
+        return this.mark("instructor");
       case "values":
         return this.applyValues(message.data);
       case "event":
