@@ -12,12 +12,12 @@ from app.twins.canopen_device import MS, SECOND, Application, CanopenDevice, Pow
 from app.twins.manual_function import KEY, ManualFunction
 from app.twins.object_store import RefusedAccessError
 from app.twins.plant_power import PowerPlant
-from app.twins.pmm_battery import BatteryAlarms, Charger, Gauge, battery_sources, battery_tenths, bind_blocs
+from app.twins.pmm_battery import BatteryAlarms, Charger, Gauge, battery_sources, bind_blocs
 from app.twins.pmm_battery_test import BatteryTest
 from app.twins.pmm_errors import PmmErrors
 from app.twins.pmm_io import AlarmInputs, PmmInputs, PmmOutputs
 from app.twins.pmm_supply import PmmSupply
-from app.twins.pmm_temperature import PLACES, SENSOR_OPEN, SENSOR_SHORT, SensorState, TemperatureWatch
+from app.twins.pmm_temperature import PmmTemperatures
 from app.twins.unit_link import AxisFlag, AxisReport, SupplyFlag, SupplyReport, UnitLink
 from app.wire.nmt import NmtState
 from app.wire.sdo import Abort
@@ -65,7 +65,7 @@ class OatPmm(Application):
         self.charger = Charger(self._store, power, self.errors, self.gauge)
         self.test = BatteryTest(self._store, power, self.gauge)
         self._battery_alarms = BatteryAlarms(self._store, power, self.errors)
-        self._watches = tuple(TemperatureWatch(self._store, self.errors, place) for place in PLACES)
+        self.temperatures = PmmTemperatures(self._store, power, self.errors, self.inputs.sensors, self._motor_tenths_c)
         self.outputs = PmmOutputs(self._store, self.errors)
         self.alarms = AlarmInputs(self._store, self.errors)
         self.manual = ManualFunction(self._store, self._operated, self.errors.reset)
@@ -92,8 +92,7 @@ class OatPmm(Application):
         self.charger.clear()
         self.test.clear()
         self._battery_alarms.clear()
-        for watch in self._watches:
-            watch.clear()
+        self.temperatures.clear()
         self._slow_ns = self._keep_ns = t_ns
 
     def booted(self, t_ns: int) -> None:
@@ -111,6 +110,7 @@ class OatPmm(Application):
         self._booted = False
         self.supply.end(self.device.line.now_ns)
         self.charger.clear()
+        self.temperatures.drive(0)
         if self.link is not None:
             self.link.stop()
 
@@ -157,6 +157,10 @@ class OatPmm(Application):
         if not self.supply.failed:
             return max(1, self.supply.hold_up_ms)
         return self.supply.hold_up_ms
+
+    def _motor_tenths_c(self) -> int | None:
+        """Motor temperature in 0.1 degrees, as the PMC says it."""
+        return None if self.axis is None else self.axis.motor_tenths_c
 
     def _report(self) -> SupplyReport:
         flags = SupplyFlag.FAULT if self.errors.pending else SupplyFlag.NONE
@@ -207,39 +211,20 @@ class OatPmm(Application):
         self.charger.step(dt_s)
         self.test.step(dt_s, moves)
         self._battery_alarms.step(dt_s)
-        for place, watch in enumerate(self._watches):
-            watch.step(self._temperature(place), self._sensor(place), dt_s)
+        self.temperatures.step(dt_s)
         self.alarms.watch(self.inputs.settled)
+        self.temperatures.drive(self._outputs())
 
-    # -- temperatures, inputs, outputs ----------------------------------------------------------
-
-    def _temperature(self, place: int) -> int:
-        if place == 0:
-            return battery_tenths(self._store, self.power)
-        if place == 1:
-            return round(self.power.heat_sink_c * 10)
-        return self._sensor_tenths(place - 2)
-
-    def _sensor(self, place: int) -> SensorState:
-        return SensorState.FITTED if place < 2 else self.inputs.sensors[place - 2]
-
-    def _sensor_tenths(self, number: int) -> int:
-        state = self.inputs.sensors[number]
-        if state is SensorState.SHORT_CIRCUIT:
-            return SENSOR_SHORT
-        if state is SensorState.INTERRUPTED:
-            return SENSOR_OPEN
-        return round(self.power.sensor_c(number) * 10)
+    # -- inputs, outputs ------------------------------------------------------------------------
 
     def _outputs(self) -> int:
         """30FEh/3: what is programmed, what the functions set, and from bit 16 on the unit's own."""
-        functions = 0
-        for watch in self._watches:
-            functions |= watch.outputs
         axis = self.axis
         known = axis is not None and AxisFlag.POSITION_VALID in axis.flags
         own = self.outputs.own(self.safety_relay, self.running, self.device.state is NmtState.OPERATIONAL)
-        return self.outputs.word(functions, axis.position_cdeg if axis is not None and known else None, own)
+        return self.outputs.word(
+            self.temperatures.outputs, axis.position_cdeg if axis is not None and known else None, own
+        )
 
     def _operated(self) -> int:
         """Selector switch and key button as bits of table 8."""
@@ -261,24 +246,17 @@ class OatPmm(Application):
     # -- objects -----------------------------------------------------------------------------------
 
     def _bind_values(self) -> None:
-        power, store = self.power, self._store
+        store = self._store
         pulse = store.cell(0x30E2)
         sources: dict[int, Callable[[], Raw]] = {
             0x3000: self._pmm_status,
             0x3005: lambda: self.test.status,
-            0x3006: lambda: self._watches[0].status,
-            0x3007: lambda: self._watches[1].status,
-            0x3008: lambda: self._watches[2].status,
-            0x3009: lambda: self._watches[3].status,
-            0x3010: lambda: battery_tenths(store, power),
-            0x3011: lambda: round(power.heat_sink_c * 10),
-            0x3012: lambda: self._sensor_tenths(0),
-            0x3013: lambda: self._sensor_tenths(1),
             0x30A0: lambda: self.inputs.analog_read_mv,
             0x30FD: lambda: self.inputs.word(pulse.number),
             0x603F: lambda: self.errors.code,
-            **battery_sources(self.gauge, self.charger, power),
+            **battery_sources(self.gauge, self.charger, self.power),
             **self.supply.sources(),
+            **self.temperatures.sources(),
         }
         for index, source in sources.items():
             store.at(Address(index)).source = source

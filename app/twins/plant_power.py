@@ -95,7 +95,7 @@ class PowerCommands:
     """What the controllers of the PMM have decided. Thresholds in V and A; the kernel acts on them in its cycle."""
 
     enabled: bool = True
-    """The unit works: booster, chopper and charger may."""
+    """The unit works: booster and charger may."""
     mains_failed: bool = False
     booster_on: bool = False
     """By command or for a test, whatever the mains does."""
@@ -202,7 +202,6 @@ class PowerPlant:
         p[k.CHARGE_A] = commands.charge_a
         if self.shorted:
             self._block(self.shorted)
-        self._write_battery()
 
     def _block(self, stages: set[Stage]) -> None:
         """A power stage that reports a short circuit switches no more."""

@@ -111,7 +111,7 @@ POLARISATION_SHARE: Final = 120
 CHARGE_A: Final = 121
 CHARGER_EFFICIENCY: Final = 122
 UNIT_ON: Final = 123
-"""The PMM works: booster, chopper and charger may."""
+"""The PMM works: booster and charger may."""
 LOCKOUT_V: Final = 124
 """Below it the electronics on the DC link fade out."""
 
@@ -142,11 +142,12 @@ def feed_consumers(s: list[float], p: list[float]) -> None:
 
 
 def switch_chopper(s: list[float], p: list[float]) -> None:
-    """On from the upper threshold, off below the lower one (manual, 4.5); what it burns is V^2 / R."""
+    """On from the upper threshold, off below the lower one (manual, 4.5); what it burns is V^2 / R.
+
+    It lives on the DC link and goes on without the unit's processor, as brake choppers do (estimate).
+    """
     voltage = s[DC_LINK_V]
-    if p[UNIT_ON] == 0.0:
-        s[CHOPPER_ON] = 0.0
-    elif p[CHOPPER_FORCED] != 0.0 or voltage >= p[CHOPPER_ON_V]:
+    if p[CHOPPER_FORCED] != 0.0 or voltage >= p[CHOPPER_ON_V]:
         s[CHOPPER_ON] = 1.0
     elif voltage < p[CHOPPER_OFF_V]:
         s[CHOPPER_ON] = 0.0
