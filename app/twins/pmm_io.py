@@ -44,6 +44,7 @@ class PmmInputs:
         self._now_ns = now_ns
         self._digital = _HEALTHY
         self._fell_ns: dict[int, int] = {}
+        self._chain_closed = True
         self.analog_mv = 4900.0
         self.selector = 0
         """Selector switch for manual functions, 0..15."""
@@ -65,8 +66,9 @@ class PmmInputs:
                 self._fell_ns[bit] = self._now_ns()
 
     def chain(self, closed: bool) -> None:
-        """Put all inputs of the safety chain to one level."""
-        if (self._digital & CHAIN_INPUTS == CHAIN_INPUTS) is not closed:
+        """The chain that feeds its three inputs has closed or opened; called again, it changes nothing."""
+        if closed is not self._chain_closed:
+            self._chain_closed = closed
             self.digital = self._digital | CHAIN_INPUTS if closed else self._digital & ~CHAIN_INPUTS
 
     def restart(self, t_ns: int) -> None:

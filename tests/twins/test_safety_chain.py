@@ -292,10 +292,10 @@ def test_a_unit_that_restarts_or_loses_its_supply_opens_the_chain(rig: Rig, node
     assert node in {found for _contact, found in rig.open_contacts()}
     rig.turbine.devices[node].power_on(rig.line.now_ns)
     rig.master.run(SECOND)
-    if node == 12:  # its PMM missed it for longer than a restart takes
-        assert rig.get(2, "603F") == 0x3221
-        rig.put(2, "3040", 0x80)
-        rig.master.run(100 * MS)
+    assert node != 12 or rig.get(2, "603F") == 0x3221  # missed for longer than a restart takes
+    rig.put(2, "3040", 0x80)
+    rig.put(12, "5040", 0x80)  # without a PMM nobody chops what the braking motor feeds back
+    rig.master.run(100 * MS)
     assert rig.closed()
 
 
