@@ -35,6 +35,18 @@ def bitrate(text: str) -> int:
     return int(text)
 
 
+def wind(text: str) -> float:
+    """A mean wind speed in m/s."""
+    return _between(text, 0.0, 60.0, "m/s")
+
+
+def seed(text: str) -> int:
+    """Of what is random: a whole number that is not negative."""
+    if not is_decimal(text):
+        raise argparse.ArgumentTypeError(f"'{text}' is no seed (a whole number)")
+    return int(text)
+
+
 def _between(text: str, low: float, high: float, unit: str) -> float:
     try:
         number = float(text)
