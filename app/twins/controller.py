@@ -18,7 +18,7 @@ from typing import Any, Final, NoReturn
 
 from app.errors import UsageError
 from app.model.address import Address
-from app.twins.cia402 import Control, State, Status
+from app.twins.cia402 import State, Status
 from app.twins.controller_plan import (
     HEARTBEAT_MS,
     PMC_POLLS,
@@ -52,6 +52,9 @@ _CYCLIC_POSITION: Final = 8
 _PMM_FAULT: Final = 1 << 2
 _PMM_TEST, _PMM_RESET = 1 << 1, 1 << 7
 _SHUTDOWN, _SWITCH_ON, _ENABLE, _RUN, _DISABLE_VOLTAGE = 0x0106, 0x0107, 0x010F, 0x000F, 0x010C
+_MODE: Final = Address(0x6060)
+_MANUAL: Final = Address(0x5040)
+_MANUAL_RESET: Final = 0x80
 _STATE_MASK: Final = 0x6F
 _ANEW_CYCLES: Final = 10
 """So often an enable that has no effect is given anew."""
@@ -285,25 +288,32 @@ class TurbineController:
         self._reset_alarm.set(self._line.now_ns + 2 * _PULSE_NS, self._reset_axes)
 
     def _reset_axes(self, t_ns: int) -> None:
+        """By 5040h bit 7: while the chain is open, an axis does not listen to its controlword (5.15)."""
         for axis in self._axes.values():
-            self._send_axis(axis, _SHUTDOWN | Control.FAULT_RESET)
+            self._write(axis.node, _MANUAL, bytes((_MANUAL_RESET,)))
+            self._write(axis.node, _MANUAL, b"\0")
         self._reset_alarm.set(t_ns + _PULSE_NS, self._reset_done)
 
+    def _write(self, node: int, address: Address, data: bytes) -> None:
+        if self._heard_lately(self._devices[node]):
+            self._sdo.write(node, address, data, lambda _answer: None)
+
     def _reset_done(self, _t_ns: int) -> None:
-        for axis in self._axes.values():
-            self._send_axis(axis, _SHUTDOWN)
         self._resetting = False
         if self.phase is Phase.TRIPPED:
             self.phase = Phase.WAITING
+
+    def _heard_lately(self, device: _Device) -> bool:
+        return device.heard_ns is not None and self._line.now_ns - device.heard_ns <= _MISSING_NS
 
     def _close_contact(self, closed: bool) -> None:
         if self._contact is not None:
             self._contact(closed)
 
-    def _fault(self, t_ns: int) -> str:
+    def _fault(self) -> str:
         """What keeps it from working on, or nothing."""
         for device in self._devices.values():
-            if device.heard_ns is not None and t_ns - device.heard_ns > _MISSING_NS:
+            if device.heard_ns is not None and not self._heard_lately(device):
                 return f"node {device.node} is silent"
             if not device.ready:
                 return f"node {device.node} has restarted"
@@ -321,7 +331,7 @@ class TurbineController:
 
     def _cycle(self, t_ns: int) -> None:
         self._alarm.set(t_ns + SYNC_NS, self._cycle)
-        self._watch(t_ns)
+        self._watch()
         demand_deg, rate_dps = self._demand(SYNC_NS / 1e9)
         if self.phase not in (Phase.WAITING, Phase.TRIPPED):
             for axis in self._axes.values():
@@ -332,16 +342,16 @@ class TurbineController:
         if not self.silent:
             self._poll(t_ns)
 
-    def _watch(self, t_ns: int) -> None:
+    def _watch(self) -> None:
         if self.phase is Phase.TRIPPED:
             return
         if self.phase is Phase.WAITING:
             known = all(axis.status is not None and axis.position_deg is not None for axis in self._axes.values())
-            if known and not self._fault(t_ns):
+            if known and not self._fault():
                 self._enter(Phase.STANDBY)
                 self._enter(self._wanted)
             return
-        if reason := self._fault(t_ns):
+        if reason := self._fault():
             self._trip(reason)
 
     def _demand(self, dt_s: float) -> tuple[float, float]:
@@ -385,7 +395,7 @@ class TurbineController:
             axis.mode_set = answer is not None
 
         if self._sdo.idle(axis.node):
-            self._sdo.write(axis.node, Address(0x6060), bytes((_CYCLIC_POSITION,)), done)
+            self._sdo.write(axis.node, _MODE, bytes((_CYCLIC_POSITION,)), done)
 
     def _send_axis(self, axis: _Axis, word: int) -> None:
         axis.word = word
@@ -429,8 +439,7 @@ class TurbineController:
         if not self._polls:
             self._polls = {node: _due(t_ns, PMC_POLLS if node in self._axes else PMM_POLLS) for node in self._devices}
         for device in self._devices.values():
-            heard = device.heard_ns is not None and t_ns - device.heard_ns <= _MISSING_NS
-            if not (heard and device.ready and self._sdo.idle(device.node)):
+            if not (self._heard_lately(device) and device.ready and self._sdo.idle(device.node)):
                 continue
             due = self._polls[device.node]
             poll = min(due, key=due.__getitem__)

@@ -73,6 +73,11 @@ class Rotor:
         """What the twin tells."""
         return TwinEnvironment(self.azimuth_deg, self.speed_rpm, self.wind.speed_mps, self.wind.direction_deg)
 
+    def settle(self, pitch_deg: Sequence[float]) -> None:
+        """Turn as if the blades had stood at these angles for long, with a generator that bounds the speed."""
+        start_nm, slope_nms = torque_line(self.wind.speed_mps, pitch_deg, self.constants.friction_nms)
+        self.speed_rpm = min(start_nm / slope_nms * RPM, RATED_RPM)
+
     def step(self, dt_s: float, pitch_deg: Sequence[float]) -> None:
         """Move on by ``dt_s`` with the blades at these angles."""
         self.wind.step(dt_s)

@@ -24,8 +24,8 @@ class WindConstants:
     """Of the wind; all are estimates."""
 
     mean_mps: float = 7.5
-    spread_mps: float = 1.1
-    """Standard deviation of the slow changes."""
+    turbulence: float = 0.14
+    """Standard deviation of the slow changes, as a share of the mean (a middle class of IEC 61400-1)."""
     time_s: float = 12.0
     direction_spread_deg: float = 6.0
     direction_time_s: float = 30.0
@@ -80,7 +80,7 @@ class Wind:
         self.direction_deg = 0.0
         """Where it comes from, from the nacelle's direction, positive clockwise seen from above."""
         self._random = Random(seed)
-        self._slow_mps = 0.0
+        self._slow = 0.0
         self._gusts: list[tuple[float, Gust | ExtremeGust]] = []
         self._t_s = 0.0
         self._goal_mps = self.mean_mps
@@ -90,7 +90,7 @@ class Wind:
     def speed_mps(self) -> float:
         """At the hub; never below 0."""
         gusts_mps = sum(gust.at(self._t_s - since_s) for since_s, gust in self._gusts)
-        return min(max(0.0, self.mean_mps + self._slow_mps + gusts_mps), MAX_WIND_MPS)
+        return min(max(0.0, self.mean_mps * (1.0 + self._slow) + gusts_mps), MAX_WIND_MPS)
 
     def set_mean(self, mean_mps: float, over_s: float = 0.0) -> None:
         """Let the mean go to ``mean_mps`` within ``over_s``. Raises ValueError where it is no wind."""
@@ -128,7 +128,7 @@ class Wind:
         if self._drift_mps_s:
             most_mps = self._drift_mps_s * dt_s
             self.mean_mps += min(max(way_mps, -most_mps), most_mps)
-        self._slow_mps = self._wander(self._slow_mps, dt_s, constants.time_s, constants.spread_mps)
+        self._slow = self._wander(self._slow, dt_s, constants.time_s, constants.turbulence)
         self.direction_deg = self._wander(
             self.direction_deg, dt_s, constants.direction_time_s, constants.direction_spread_deg
         )

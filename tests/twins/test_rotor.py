@@ -16,7 +16,7 @@ from app.wire.twin_environment import CAN_ID, parse_environment
 FEATHER = (90.0, 90.0, 90.0)
 WORKING = (0.0, 0.0, 0.0)
 SECOND = 1_000_000_000
-CALM = WindConstants(spread_mps=0.0, direction_spread_deg=0.0)
+CALM = WindConstants(turbulence=0.0, direction_spread_deg=0.0)
 
 
 def run(rotor: Rotor, seconds: float, pitch: tuple[float, ...]) -> None:
@@ -65,8 +65,16 @@ def test_a_generator_holds_the_speed_at_which_its_torque_is_that_of_the_wind() -
     assert rotor.speed_rpm == pytest.approx(0.0, abs=1e-6)
 
 
+@pytest.mark.parametrize("angle_deg", [0.0, 40.0, 90.0])
+def test_settled_it_turns_as_after_a_long_time(angle_deg: float) -> None:
+    settled, patient = Rotor(1, None, CALM), Rotor(1, None, CALM)
+    settled.settle((angle_deg,) * 3)
+    run(patient, 300, (angle_deg,) * 3)
+    assert settled.speed_rpm == pytest.approx(patient.speed_rpm, rel=1e-3)
+
+
 def test_feathered_at_rated_speed_it_is_braked_within_some_ten_seconds() -> None:
-    rotor = Rotor(1, None, WindConstants(mean_mps=12.0, spread_mps=0.0))
+    rotor = Rotor(1, None, WindConstants(mean_mps=12.0, turbulence=0.0))
     rotor.speed_rpm, rotor.generator_nm = RATED_RPM, 0.0
     run(rotor, 4, FEATHER)
     assert 0.2 * RATED_RPM < rotor.speed_rpm < 0.5 * RATED_RPM

@@ -9,7 +9,7 @@ import pytest
 
 from app.twins.wind import MAX_WIND_MPS, Wind, WindConstants
 
-CALM = WindConstants(mean_mps=12.0, spread_mps=0.0, direction_spread_deg=0.0)
+CALM = WindConstants(mean_mps=12.0, turbulence=0.0, direction_spread_deg=0.0)
 
 
 def course(wind: Wind, seconds: float, dt_s: float = 0.1) -> list[float]:
@@ -27,7 +27,7 @@ def test_it_stays_around_its_mean_whatever_the_step(dt_s: float) -> None:
     assert sum(speeds) / len(speeds) == pytest.approx(wind.constants.mean_mps, abs=0.6)
     assert min(speeds) >= 0.0
     spread = (sum((speed - 7.5) ** 2 for speed in speeds) / len(speeds)) ** 0.5
-    assert spread == pytest.approx(wind.constants.spread_mps, rel=0.35)
+    assert spread == pytest.approx(wind.constants.turbulence * 7.5, rel=0.35)
 
 
 def test_a_gust_rises_by_half_a_cosine_stays_and_falls() -> None:
@@ -83,7 +83,7 @@ def test_the_mean_goes_where_it_is_sent_at_once_or_slowly() -> None:
     assert course(wind, 4)[-1] == pytest.approx(13.0)
 
 
-REFUSED: dict[str, Callable[[Wind], None]] = {
+REFUSED: dict[str, Callable[[Wind], object]] = {
     "below 0": lambda wind: wind.set_mean(-1.0),
     "too strong": lambda wind: wind.set_mean(MAX_WIND_MPS + 1),
     "no number": lambda wind: wind.set_mean(float("nan")),
@@ -96,7 +96,7 @@ REFUSED: dict[str, Callable[[Wind], None]] = {
 
 
 @pytest.mark.parametrize("call", REFUSED.values(), ids=REFUSED)
-def test_what_is_no_wind_is_refused(call: Callable[[Wind], None]) -> None:
+def test_what_is_no_wind_is_refused(call: Callable[[Wind], object]) -> None:
     wind = Wind(1, CALM)
     with pytest.raises(ValueError, match="m/s"):
         call(wind)
