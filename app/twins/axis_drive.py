@@ -8,27 +8,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from enum import Enum
-from math import exp, pi
+from math import pi
 from typing import Final
 
 from app.twins import axis_kernel as k
 from app.twins.axis_profile import Profile, SetPoints, Target
-from app.twins.axis_scaling import Scaling, blade_scaling, motor_scaling
+from app.twins.axis_scaling import Scaling, blade_scaling, interpolation_ms, motor_scaling
+from app.twins.axis_tuning import SIMULATION, tune
 from app.twins.cia402 import Stop
 from app.twins.object_store import ObjectStore
 from app.twins.plant import BLADE_INCREMENTS_PER_RAD, ENCODER_INCREMENTS, AxisPlant
 
-_VELOCITY_LOOP_S: Final = 0.010
-_VELOCITY_RESET_S: Final = 0.100
-_CURRENT_LOOP_S: Final = 0.002
-_VELOCITY_GAIN, _VELOCITY_INTEGRAL, _VELOCITY_DIFFERENTIAL = 100, 200, 100
-_CURRENT_GAIN, _CURRENT_INTEGRAL = 16, 512
-"""60F9h and 60F6h hold gains without units. With their defaults (for the differential share that is 0) the loops get
-these time constants: current 2 ms, velocity 10 ms, its integral 100 ms, as a drive of this size is tuned (estimate);
-other values change the gains in proportion."""
-_DIFFERENTIAL_S: Final = 0.001
-_LONGEST_FILTER: Final = 16
-"""60F9h/5 is an exponent; beyond it the loop is dead anyway (a minute)."""
 _REST_RAD_S: Final = 1.0
 """Below this the motor counts as standing (0.03 degrees/s of the blade)."""
 _SETTLED_RAD_S: Final = 0.05
@@ -37,10 +27,6 @@ _CURRENT_LIMIT_SHARE: Final = 0.8
 """Share of the current limit that a stop plans with, so that the controller can follow."""
 _LEAST_STOP_SHARE: Final = 0.1
 """A stop is planned with at least this share of the rated torque, however low 6073h is."""
-_NO_WINDOW: Final = 0xFFFFFFFF
-"""6065h: monitoring off."""
-_SIMULATION: Final = 1 << 15
-"""60FBh/3: the axis is not moved."""
 _FEATHER_TO_SWITCH: Final = 1 << 8
 """60FBh/3: the 90 degree switch must be actuated in feather."""
 _FEATHER_BY_VELOCITY: Final = 1 << 9
@@ -59,15 +45,21 @@ class Mode(Enum):
     HEATING = -113
 
 
-_POSITION_MODES: Final = (Mode.PROFILE_POSITION, Mode.CYCLIC_POSITION, Mode.HOMING, Mode.HEATING, Mode.NONE)
-
-
 class Feedback(Enum):
     """What the axis is controlled with (manual, below table 50: an EFC with an encoder error)."""
 
     MOTOR_ENCODER = "motor encoder"
+    """Its speed; the position by the encoder that 606Ah selects."""
     BLADE_ENCODER = "additional encoder"
     NONE = "speed control without encoder"
+
+
+_SPEED_SOURCES: Final = {
+    Feedback.MOTOR_ENCODER: k.MOTOR_ENCODER,
+    Feedback.BLADE_ENCODER: k.BLADE_ENCODER,
+    Feedback.NONE: k.NO_ENCODER,
+}
+_POSITION_MODES: Final = (Mode.PROFILE_POSITION, Mode.CYCLIC_POSITION, Mode.HOMING, Mode.HEATING, Mode.NONE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,8 +83,7 @@ class AxisDrive:
         self.halted = False
         self.energised = False
         self.watchdog_closed = False
-        self.feedback = Feedback.MOTOR_ENCODER
-        """Set by whoever sees that an encoder has failed."""
+        self._feedback = Feedback.MOTOR_ENCODER
         self.targets = SetPoints()
         self.profile = Profile(plant.s)
         self.limit_active = False
@@ -100,6 +91,8 @@ class AxisDrive:
         self._operating = False
         self._stop: Stop | None = None
         self._feather_target: Target | None = None
+        self._cyclic: Target | None = None
+        self._cyclic_halted = False
         self.blade = blade_scaling(store)
         self._now = self._read_parameters()
 
@@ -114,6 +107,29 @@ class AxisDrive:
     def position(self) -> float:
         """Actual position by the encoder that 606Ah selects (6064h)."""
         return self.blade_position if self._store.number(0x606A) == -1 else self.motor_position
+
+    @property
+    def feedback(self) -> Feedback:
+        """What the axis is controlled with; set by whoever sees that an encoder has failed."""
+        return self._feedback
+
+    @feedback.setter
+    def feedback(self, feedback: Feedback) -> None:
+        if feedback is not self._feedback:
+            self._feedback = feedback
+            # The encoders differ: without this the axis would jump.
+            self.profile.put(self._controlled_position, self.profile.velocity)
+
+    @property
+    def _by_blade(self) -> bool:
+        if self._feedback is Feedback.BLADE_ENCODER:
+            return True
+        return self._store.number(0x606A) == -1 and not self.plant.blade_encoder_failed
+
+    @property
+    def _controlled_position(self) -> float:
+        """Actual position by the encoder that the axis is controlled with."""
+        return self.blade_position if self._by_blade else self.motor_position
 
     @property
     def motor_position(self) -> float:
@@ -150,7 +166,7 @@ class AxisDrive:
     @property
     def following_error(self) -> float:
         """Set-point minus actual position while the position is controlled (60F4h)."""
-        return self.profile.position - self.position if self._controls_position else 0.0
+        return self.profile.position - self._controlled_position if self._controls_position else 0.0
 
     @property
     def current_permille(self) -> float:
@@ -227,7 +243,7 @@ class AxisDrive:
         before = self._now.scaling
         self._now = self._read_parameters()
         if self._now.scaling != before:
-            self.profile.put(self.position)
+            self.profile.put(self._controlled_position)
 
     def refresh_blade(self) -> None:
         """Take the scaling of the additional encoder in force."""
@@ -238,6 +254,7 @@ class AxisDrive:
         self.mode = mode
         self.targets.clear()
         self.limit_active = False
+        self._cyclic, self._cyclic_halted = None, False
 
     def new_set_point(self) -> None:
         """Controlword bit 4 rose in mode 1: the target is limited and handed over."""
@@ -303,7 +320,7 @@ class AxisDrive:
         """What the next cycles are to do."""
         p = self.plant.p
         p[k.ENERGISED] = 1.0 if self.energised else 0.0
-        p[k.EXTRA_VELOCITY] = p[k.WATCHES_TARGET] = 0.0
+        p[k.EXTRA_VELOCITY] = p[k.WATCHES_TARGET] = p[k.HEATING_A] = 0.0
         if not self.energised:
             return
         p[k.CONTROLS_POSITION] = 1.0 if self._controls_position else 0.0
@@ -322,14 +339,13 @@ class AxisDrive:
             self._follow_velocity(self._current_limit_deceleration())
         else:
             self._hold_at(self._stopping_deceleration())
+            if self.mode is Mode.HEATING:
+                p[k.HEATING_A] = self._store.number(0x6410, 13) / 1000 * self.plant.constants.rated_current_a
 
     def _choose_encoders(self) -> None:
         p = self.plant.p
-        by_blade = self.feedback is Feedback.BLADE_ENCODER
-        p[k.SPEED_SOURCE] = k.BLADE_ENCODER if by_blade else k.MOTOR_ENCODER
-        if self.feedback is Feedback.NONE:
-            p[k.SPEED_SOURCE] = k.NO_ENCODER
-        by_blade = by_blade or self._store.number(0x606A) == -1
+        p[k.SPEED_SOURCE] = _SPEED_SOURCES[self._feedback]
+        by_blade = self._by_blade
         p[k.POSITION_SOURCE] = k.BLADE_ENCODER if by_blade else k.MOTOR_ENCODER
         if by_blade:
             failed = self.plant.blade_encoder_failed
@@ -349,6 +365,7 @@ class AxisDrive:
         p[k.TARGET_VELOCITY] = target.velocity
         p[k.TARGET_ACCELERATION] = target.acceleration
         p[k.TARGET_DECELERATION] = target.deceleration
+        p[k.PASS_VELOCITY] = 0.0
 
     def _follow_target(self) -> None:
         target = self.targets.active
@@ -367,18 +384,42 @@ class AxisDrive:
         """
         if self.halted:
             self._hold_at(self._current_limit_deceleration())
+            self._cyclic, self._cyclic_halted = None, True
             return
         velocity, acceleration, deceleration = self._motion_limits()
         position = self._limited_position(self._store.number(0x607A) + self._store.number(0x60B0))
-        self._go_to(Target(position, velocity, acceleration, deceleration))
+        if self._cyclic_halted:  # back to position control without a ramp
+            self._cyclic_halted = False
+            self.profile.put(position)
+        if self._cyclic is None or self._cyclic.position != position:
+            before, self._cyclic = self._cyclic, Target(position, velocity, acceleration, deceleration)
+            self._approach(self._cyclic, 0.0 if before is None else position - before.position)
         self.plant.p[k.EXTRA_VELOCITY] = self._store.number(0x60B1)
+
+    def _approach(self, target: Target, moved: float) -> None:
+        """A cyclic set-point: straight within the time of 60C2h, or as fast as the limits allow where they do not."""
+        period_s = float(interpolation_ms(self._store.number(0x60C2, 1), self._store.number(0x60C2, 2))) / 1000
+        velocity = abs(target.position - self.profile.position) / max(period_s, k.CYCLE_S)
+        change = abs(velocity - abs(self.profile.velocity))
+        self._go_to(target)
+        self.plant.s[k.WAITED] = 0.0
+        if velocity <= target.velocity and change <= target.acceleration * period_s:
+            self.plant.p[k.SET_KIND] = k.LINEAR
+            self.plant.p[k.TARGET_VELOCITY] = velocity
+        else:
+            self.plant.p[k.PASS_VELOCITY] = moved / max(period_s, k.CYCLE_S)
+            self.plant.p[k.PASS_CYCLES] = period_s / k.CYCLE_S + k.PATIENCE
 
     def _follow_velocity(self, stopping: float) -> None:
         """Modes 3 and 9: 60FFh (mode 9: + 60B1h) within the limits; ``stopping`` is the deceleration on halt."""
         if self.halted:
             self._hold_at(stopping)
+            self._cyclic_halted = self.mode is Mode.CYCLIC_VELOCITY
             return
         _limit, acceleration, deceleration = self._motion_limits()
+        if self._cyclic_halted:  # mode 9: back to its velocity without a ramp
+            self._cyclic_halted = False
+            self.profile.put(self.profile.position, self._velocity_target())
         self._run_at(self._velocity_target(), acceleration, deceleration)
 
     def _run_at(self, velocity: float, acceleration: float, deceleration: float) -> None:
@@ -400,8 +441,9 @@ class AxisDrive:
     def _hold(self) -> None:
         """Set-points at the actual values; an axis that still moves is brought to rest from its velocity."""
         moves = abs(self.plant.speed_rad_s) >= _REST_RAD_S
-        self.profile.put(self.position, self.velocity if moves else 0.0)
+        self.profile.put(self._controlled_position, self.velocity if moves else 0.0)
         self.targets.clear()
+        self._cyclic = None
         self.plant.s[k.WINDOW_S] = self._now.position_time_s
         self.plant.s[k.FOLLOWING_S] = 0.0
         self.following_tripped = False
@@ -472,12 +514,13 @@ class AxisDrive:
         return rate * abs(self.scaling.units_per_rad)
 
     def _velocity_target(self) -> float:
-        """60FFh (mode 9: with 60B1h) within +-607Fh."""
+        """60FFh within +-607Fh; in mode 9 with 60B1h, and within +-6081h where that is given."""
         store = self._store
         wanted = store.number(0x60FF)
+        limit = store.number(0x607F)
         if self.mode is Mode.CYCLIC_VELOCITY:
             wanted += store.number(0x60B1)
-        limit = store.number(0x607F)
+            limit = min(limit, store.number(0x6081) or limit)
         return min(max(wanted, -limit), limit)
 
     def _limited_position(self, wanted: int) -> float:
@@ -488,50 +531,11 @@ class AxisDrive:
 
     def _read_parameters(self) -> _Parameters:
         store = self._store
-        self._tune()
+        tune(store, self.plant)
         return _Parameters(
             scaling=motor_scaling(store),
             speed_limit_rad_s=store.number(0x6080) * 2 * pi / 60,
             peak_torque_nm=min(store.number(0x6073), 2000) / 1000 * self.plant.constants.rated_torque_nm,
             position_time_s=store.number(0x6068) / 1000,
-            simulation=bool(store.number(0x60FB, 3) & _SIMULATION),
+            simulation=bool(store.number(0x60FB, 3) & SIMULATION),
         )
-
-    def _tune(self) -> None:
-        """Give the cycles the parameters in force (60FBh, 60F9h, 60F6h, 6065h to 6068h, 6073h, 6080h)."""
-        store, p, constants = self._store, self.plant.p, self.plant.constants
-        scaling = motor_scaling(store)
-        p[k.UNITS_PER_RAD] = scaling.signed_factor * ENCODER_INCREMENTS / (2 * pi)
-        p[k.OFFSET_UNITS] = scaling.position(self.plant.encoder_zero_increments)
-        p[k.POSITION_GAIN] = store.number(0x60FB, 1)
-        p[k.FEED_FORWARD] = store.number(0x60FB, 2) / 1000
-        p[k.SIMULATION] = 1.0 if store.number(0x60FB, 3) & _SIMULATION else 0.0
-        p[k.SPEED_LIMIT] = store.number(0x6080) * 2 * pi / 60
-        p[k.PEAK_A] = min(store.number(0x6073), 2000) / 1000 * constants.rated_current_a
-        p[k.NOMINAL_A] = constants.rated_current_a
-        p[k.PEAK_TIME_S] = store.number(0x60F6, 3) / 1000
-        self._tune_velocity_loop()
-        self._tune_current_loop()
-        window = store.number(0x6065)
-        p[k.FOLLOWING_WINDOW] = k.NO_WINDOW if window == _NO_WINDOW else window
-        p[k.FOLLOWING_TIME_S] = store.number(0x6066) / 1000
-        p[k.POSITION_WINDOW] = store.number(0x6067)
-        p[k.POSITION_TIME_S] = store.number(0x6068) / 1000
-
-    def _tune_velocity_loop(self) -> None:
-        """60F9h: gains, and the filter of the measured speed, 2 to the power of sub-index 5 in ms."""
-        store, p, constants = self._store, self.plant.p, self.plant.constants
-        filter_s = 2 ** min(store.number(0x60F9, 5), _LONGEST_FILTER) / 1000
-        usual = constants.inertia_kgm2 / _VELOCITY_LOOP_S / constants.torque_nm_per_a
-        p[k.FILTER] = 1 - exp(-k.CYCLE_S / filter_s)
-        p[k.VELOCITY_P] = usual * store.number(0x60F9, 1) / _VELOCITY_GAIN
-        p[k.VELOCITY_I] = usual / _VELOCITY_RESET_S * store.number(0x60F9, 2) / _VELOCITY_INTEGRAL
-        p[k.VELOCITY_D] = usual * _DIFFERENTIAL_S / filter_s * store.number(0x60F9, 3) / _VELOCITY_DIFFERENTIAL
-
-    def _tune_current_loop(self) -> None:
-        """60F6h: the integral share makes up for what the windings lose; both make a lag of the first order."""
-        store, p, constants = self._store, self.plant.p, self.plant.constants
-        lost = 1 - p[k.DECAY]
-        usual = (1 - exp(-k.CYCLE_S / _CURRENT_LOOP_S)) * constants.resistance_ohm / lost
-        p[k.CURRENT_P] = usual * store.number(0x60F6, 1) / _CURRENT_GAIN
-        p[k.CURRENT_I] = usual * lost * store.number(0x60F6, 2) / _CURRENT_INTEGRAL

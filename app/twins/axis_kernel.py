@@ -52,6 +52,8 @@ ENCODER_RAD = 21
 ENCODER_RAD_S = 22
 MESH_NM = 23
 CURRENT_WANTED_A = 24
+WAITED = 25
+"""Cycles for which a cyclic set-point has been reached, or approached beyond its time, and no other came."""
 MOTOR_J = 30
 """Energy that the output stage took from the DC link; the next ones say what became of it."""
 COPPER_J = 31
@@ -103,6 +105,12 @@ WATCHES_TARGET = 30
 SIMULATION = 31
 EXTRA_VELOCITY = 32
 """Added to the wanted velocity (60B1h in mode 8)."""
+HEATING_A = 33
+"""Current that heats the motor and makes no torque."""
+PASS_VELOCITY = 34
+"""With which a target is passed, signed: cyclic set-points that the axis has yet to catch up with go on with it..."""
+PASS_CYCLES = 35
+"""... for so many cycles, if no other comes."""
 MOTOR_KGM2 = 40
 BLADE_KGM2 = 41
 MOTOR_FRICTION_NM = 42
@@ -137,6 +145,10 @@ RUN = 2.0
 """With p[TARGET_VELOCITY], signed."""
 QUICK = 3.0
 """No speed at once: as fast as the current allows."""
+LINEAR = 4.0
+"""To p[TARGET] with p[TARGET_VELOCITY], where the next one is expected by then."""
+PATIENCE = 2.0
+"""Cycles that a next set-point may be late: a SYNC is, by the frames before it."""
 
 # -- p[POSITION_SOURCE], p[SPEED_SOURCE] -----------------------------------------------------------
 MOTOR_ENCODER = 0.0
@@ -235,7 +247,7 @@ def motor_and_gear(s: list[float], p: list[float], voltage: float) -> None:
     mean = (before + after) / 2
     s[CURRENT_A] = after
     work = mechanics(s, p, mean * p[TORQUE_NM_PER_A])
-    copper = 1.5 * p[RESISTANCE_OHM] * mean * mean * CYCLE_S
+    copper = 1.5 * p[RESISTANCE_OHM] * (mean * mean + p[HEATING_A] * p[HEATING_A]) * CYCLE_S
     stage = (p[STAGE_W] + p[STAGE_V] * abs(mean)) * CYCLE_S
     magnetic = 0.75 * p[INDUCTANCE_H] * (after * after - before * before)
     taken = work + copper + stage + magnetic
@@ -337,7 +349,11 @@ def move_set_points(s: list[float], p: list[float]) -> None:
             s[SET_VELOCITY] = 0.0
             return
         step = deceleration * CYCLE_S / 2
-        braking = sqrt(step * step + 2 * deceleration * abs(distance)) - step
+        onward = 0.0
+        if p[PASS_VELOCITY] * distance > 0.0 and s[WAITED] < p[PASS_CYCLES]:
+            s[WAITED] += 1.0
+            onward = p[PASS_VELOCITY] * p[PASS_VELOCITY]
+        braking = sqrt(step * step + 2 * deceleration * abs(distance) + onward) - step
         velocity = changed(velocity, copysign(min(p[TARGET_VELOCITY], braking), distance), acceleration, deceleration)
         move = velocity * CYCLE_S
         if abs(distance) <= abs(move) and abs(velocity) <= deceleration * CYCLE_S * 2:
@@ -346,11 +362,33 @@ def move_set_points(s: list[float], p: list[float]) -> None:
         else:
             s[SET_POSITION] += move
             s[SET_VELOCITY] = velocity
+    elif kind == LINEAR:
+        interpolate(s, p)
     else:
         wanted = p[TARGET_VELOCITY] if kind == RUN else 0.0
         velocity = changed(velocity, wanted, acceleration, deceleration)
         s[SET_VELOCITY] = velocity
         s[SET_POSITION] += velocity * CYCLE_S
+
+
+def interpolate(s: list[float], p: list[float]) -> None:
+    """Straight to a cyclic set-point; there, the velocity counts until the next one is overdue."""
+    distance = p[TARGET] - s[SET_POSITION]
+    if distance == 0.0:
+        s[WAITED] += 1.0
+        if s[WAITED] > PATIENCE:
+            s[SET_VELOCITY] = 0.0
+        return
+    s[WAITED] = 0.0
+    wanted = copysign(p[TARGET_VELOCITY], distance)
+    velocity = changed(s[SET_VELOCITY], wanted, p[TARGET_ACCELERATION], p[TARGET_DECELERATION])
+    move = velocity * CYCLE_S
+    s[SET_VELOCITY] = velocity
+    # Rounding must not leave a crumb for another cycle.
+    if abs(distance) <= abs(move) * 1.000001 and move * distance > 0.0:
+        s[SET_POSITION] = p[TARGET]
+    else:
+        s[SET_POSITION] += move
 
 
 def changed(velocity: float, wanted: float, acceleration: float, deceleration: float) -> float:

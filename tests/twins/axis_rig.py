@@ -28,7 +28,7 @@ def run_stiff(s: list[float], p: list[float], cycles: int) -> int:
 class AxisRig:
     """An axis at 50 degrees that is switched on. Values are those of objects."""
 
-    def __init__(self, constants: AxisConstants | None = None, **values: int) -> None:
+    def __init__(self, constants: AxisConstants | None = None, /, **values: int) -> None:
         self.store = ObjectStore(load_builtin("oat-pmc"), 11)
         for address, raw in commissioned(0.0, 0.0).items():
             self.store.at(address).raw = raw

@@ -118,7 +118,7 @@ def test_a_step_of_the_velocity_is_that_of_an_independent_solution() -> None:
 @pytest.mark.parametrize(("where", "raw"), [("60F9:01", 40), ("60F9:02", 800), ("60F9:03", 200), ("60F6:01", 4)])
 def test_gains_change_what_is_seen(where: str, raw: int) -> None:
     def course(**values: int) -> list[float]:
-        rig = AxisRig(x607F=20000, x6083=10**9, x60C5=10**9, x60FF=100, **values)
+        rig = AxisRig(None, x607F=20000, x6083=10**9, x60C5=10**9, x60FF=100, **values)
         rig.start(Mode.PROFILE_VELOCITY)
         speeds: list[float] = []
         rig.run(0.2, lambda: speeds.append(rig.plant.speed_rad_s))
@@ -256,3 +256,70 @@ def test_without_any_encoder_the_axis_runs_under_speed_control() -> None:
     before = rig.plant.angle_deg
     rig.run(3.0)
     assert rig.plant.angle_deg - before == pytest.approx(5.0 * (3.0 - 500 / 1500 / 2), rel=0.05)
+
+
+@pytest.mark.rule("K11")
+@pytest.mark.rule("K13")
+def test_cyclic_set_points_on_a_line_make_an_even_velocity() -> None:
+    """Every 20 ms another target, up to 6 degrees/s; some come late by a cycle, as behind other frames."""
+    rig = AxisRig(x6081=1000, x6083=6000, x6084=6000, x60C2_01=20, x607A=5000)
+    rig.start(Mode.CYCLIC_POSITION)
+    velocities: list[float] = []
+    target = 5000
+    for step in range(1, 80):
+        target += min(12, step)
+        rig.put("607A", target)
+        rig.run(0.020 + 0.001 * (step % 3 - 1), lambda: velocities.append(rig.drive.profile.velocity))
+    steady = velocities[900:]  # it has caught up with what the limits held back
+    assert np.mean(steady) == pytest.approx(600, rel=0.02)
+    assert min(steady) > 570
+    assert max(steady) < 650
+    assert abs(rig.drive.profile.position - target) < 13
+    rig.run(0.1)
+    assert rig.drive.profile.velocity == 0.0
+    assert rig.drive.profile.position == target
+
+
+@pytest.mark.rule("K13")
+def test_a_cyclic_set_point_beyond_the_limits_is_approached_within_them() -> None:
+    rig = AxisRig(x6081=500, x60C2_01=20, x607A=5000)
+    rig.start(Mode.CYCLIC_POSITION)
+    rig.put("607A", 6000)
+    velocities: list[float] = []
+    rig.run(3.0, lambda: velocities.append(rig.drive.profile.velocity))
+    assert max(velocities) == 500
+    steps = np.diff(velocities)
+    assert max(steps) <= 1.5 + 1e-9  # 6083h, 15 degrees/s2
+    assert min(steps) >= -1.5 - 1e-6 - 3.0  # the last of them meets the target
+    assert rig.drive.profile.position == 6000
+
+
+@pytest.mark.rule("K11")
+@pytest.mark.rule("K12")
+@pytest.mark.parametrize(
+    ("mode", "where", "raw"), [(Mode.CYCLIC_POSITION, "607A", 5300), (Mode.CYCLIC_VELOCITY, "60FF", 300)]
+)
+def test_the_end_of_halt_jumps_back_without_a_ramp(mode: Mode, where: str, raw: int) -> None:
+    rig = AxisRig(x6081=1000, x607A=5000, x6065=-1 & 0xFFFFFFFF)
+    rig.start(mode)
+    rig.drive.halted = True
+    rig.run(0.1)
+    rig.put(where, raw)
+    rig.run(0.1)
+    assert rig.drive.profile.velocity == 0.0
+    rig.drive.halted = False
+    rig.run(0.002)
+    reached = rig.drive.profile.position if mode is Mode.CYCLIC_POSITION else rig.drive.profile.velocity
+    assert reached == raw
+
+
+@pytest.mark.rule("K17")
+def test_heating_makes_losses_and_no_motion() -> None:
+    rig = AxisRig(x6410_0D=400)
+    rig.start(Mode.HEATING)
+    rig.run(1.0)
+    s, rated_w = rig.plant.s, rig.plant.constants.winding_loss_w
+    assert s[k.COPPER_J] == pytest.approx(0.4**2 * rated_w, rel=0.01)
+    assert s[k.MOTOR_J] == pytest.approx(s[k.COPPER_J] + s[k.INVERTER_J], rel=0.01)
+    assert rig.plant.angle_deg == pytest.approx(50.0, abs=0.01)
+    assert rig.drive.current_permille == 400
