@@ -125,6 +125,8 @@ class PowerPlant:
     ambient_c: float = 22.0
     commands: PowerCommands = field(default_factory=PowerCommands)
     brake_lifted: bool = False
+    extra_load_w: float = 0.0
+    """What else is drawn from the DC link; negative: fed into it."""
     external_v: float | None = None
     """External 24 V feed-in at its clamp; None: not fitted."""
     extra_supply_a: float = 0.0
@@ -189,6 +191,7 @@ class PowerPlant:
             self._table = table
             p[k.LINE_TABLE : k.LINE_TABLE + k.TABLE_LENGTH] = table
         p[k.SUPPLY_W] = self.adapter_w
+        p[k.ELECTRONICS_W] = self.constants.idle_load_w + self.extra_load_w
         p[k.UNIT_ON] = float(commands.enabled)
         p[k.MAINS_FAILED] = float(commands.mains_failed)
         p[k.BOOSTER_FORCED] = float(commands.booster_on)
@@ -258,7 +261,6 @@ class PowerPlant:
         p, constants = self.p, self.constants
         p[k.RECTIFIER_SHARE] = 1.0 - exp(-k.DT_S / (constants.line_ohm * constants.capacity_f))
         p[k.CAPACITY_F] = constants.capacity_f
-        p[k.ELECTRONICS_W] = constants.idle_load_w
         p[k.LOCKOUT_V] = constants.lockout_v
         p[k.CHOPPER_OHM] = constants.chopper_ohm
         p[k.BOOSTER_EFFICIENCY] = constants.booster_efficiency
@@ -320,6 +322,11 @@ class PowerPlant:
     @dc_link_v.setter
     def dc_link_v(self, voltage: float) -> None:
         self.s[k.DC_LINK_V] = voltage
+
+    @property
+    def mains_a(self) -> float:
+        """Current that the rectifier gives."""
+        return self.s[k.MAINS_A]
 
     @property
     def motor_power_w(self) -> float:
