@@ -14,6 +14,7 @@ from typing import Final
 from app.model.address import Address
 from app.model.datatypes import Raw, encode_raw
 from app.model.description import Description, Entry
+from app.twins import sdo_block
 from app.twins.emergency import Emergency
 from app.twins.heartbeat import HeartbeatConsumer, HeartbeatProducer
 from app.twins.nonvolatile import NonVolatile
@@ -31,12 +32,16 @@ MS: Final = 1_000_000
 SECOND: Final = 1_000_000_000
 HEARTBEAT_LOST: Final = 0x8130
 """Emergency code: life guard or heartbeat error (CiA 301, table 26)."""
+OVERFLOW: Final = 0x8110
+"""Emergency code: CAN overrun, messages lost (CiA 301, table 26)."""
 WAS_BUS_OFF: Final = 0x8140
 """Emergency code: recovered from bus off (CiA 301, table 26)."""
 _COMMUNICATION: Final = range(0x1000, 0x2000)
 _SYNC_PRODUCER: Final = 1 << 30
 _EXTENDED: Final = 1 << 29
 _RESET_COMMUNICATION_NS: Final = 20 * MS
+_QUEUE_FRAMES: Final = sdo_block.MAX_BLOCK + 17
+"""OPEN how many frames wait in a unit whose bus is not free; a block of SDO segments, and some besides."""
 
 
 class Power(Enum):
@@ -108,6 +113,7 @@ class CanopenDevice:
         self._mount = mount
         self._routes: dict[int, Callable[[Can, int], None]] = {}
         self._own_routes: dict[int, Callable[[Can, int], None]] = {}
+        self._overflown = False
         self._powered_ns = 0
         self._boot_alarm = Alarm(line)
         self._port = self.port = line.attach(self._on_frame)
@@ -125,7 +131,7 @@ class CanopenDevice:
         self._sdo = SdoServer(self.store, line, self._answer, TIMEOUT_NS + mount.turnaround_ns)
         self._producer = HeartbeatProducer(self.store, line, self._beat)
         self._consumer = HeartbeatConsumer(self.store, line, self._heartbeat_lost, self._route)
-        self._pdo = PdoEngine(self.store, line, self._port.send, self._route)
+        self._pdo = PdoEngine(self.store, line, self._transmit, self._route)
         self._install_sync()
         self._route()
 
@@ -174,7 +180,7 @@ class CanopenDevice:
     def send(self, can: Can) -> None:
         """Send a frame of the maker's own; nothing while the node boots or is stopped (CiA 301, 7.3.2.2.4)."""
         if self.power is Power.ON and self.state is not NmtState.STOPPED:
-            self._port.send(can)
+            self._transmit(can)
 
     # -- boot and NMT (7.3.2) ------------------------------------------------------
 
@@ -310,7 +316,16 @@ class CanopenDevice:
         self._sdo.late_ns = delay_ns
 
     def _beat(self) -> None:
-        self._port.send(Can(nmt.HEARTBEAT_BASE + self.node_id, nmt.heartbeat(self.state)))
+        self._transmit(Can(nmt.HEARTBEAT_BASE + self.node_id, nmt.heartbeat(self.state)))
+
+    def _transmit(self, can: Can) -> None:
+        """Send a frame that comes again; it is lost where too many wait already, and that is told once."""
+        if self._port.pending < _QUEUE_FRAMES:
+            self._overflown = False
+            self._port.send(can)
+        elif not self._overflown:
+            self._overflown = True
+            self.application.communication_error(OVERFLOW)
 
     def _send_emergency(self, can_id: int, data: bytes) -> None:
         if self.power is Power.ON and self.state is not NmtState.STOPPED:

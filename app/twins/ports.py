@@ -17,7 +17,12 @@ OnTime = Callable[[int], None]
 
 
 class Port(Protocol):
-    """A node's place on the line; frames of one identifier leave in the order in which they were sent."""
+    """A node's place on the line; frames of one identifier leave in the order in which they were sent.
+
+    ``pending``: how many wait.
+    """
+
+    pending: int
 
     def send(self, can: Can, not_before_ns: int = 0, /) -> None:
         """Queue a frame that takes part in arbitration from ``not_before_ns`` on (0: at once)."""
