@@ -54,6 +54,8 @@ class LineClient:
         self._port.accept(())
         self._alarm = Alarm(line)
         self._jobs: deque[_Job] = deque()
+        self.on_send: Callable[[Can], None] = lambda _can: None
+        """Is told every frame that it sends, as it is queued."""
 
     def read(self, node: int, address: Address, then: Then = lambda _answer: None) -> None:
         """Read an object; ``then`` gets what came."""
@@ -87,12 +89,16 @@ class LineClient:
     def _begin(self) -> None:
         while self._jobs:
             job = self._jobs[0]
-            self._port.send(job.frame)
+            self._send(job.frame)
             if job.address is not None:
                 self._port.accept((sdo.RESPONSE_BASE + job.node,))
                 self._alarm.set(self._line.now_ns + self._answer_ns, self._given_up)
                 return
             self._jobs.popleft()
+
+    def _send(self, can: Can) -> None:
+        self.on_send(can)
+        self._port.send(can)
 
     def _given_up(self, _t_ns: int) -> None:
         self._finish(Answer(abort=Abort.TIMED_OUT))
@@ -123,7 +129,7 @@ class LineClient:
             if data is not None:
                 self._finish(Answer(data))
             else:
-                self._port.send(_request(job.node, sdo.upload_segment_request(job.toggle)))
+                self._send(_request(job.node, sdo.upload_segment_request(job.toggle)))
 
     def _segment(self, job: _Job, data: bytes) -> None:
         piece = sdo.segment(data)
@@ -132,7 +138,7 @@ class LineClient:
         if piece.last:
             self._finish(Answer(bytes(job.collected)))
         else:
-            self._port.send(_request(job.node, sdo.upload_segment_request(job.toggle)))
+            self._send(_request(job.node, sdo.upload_segment_request(job.toggle)))
 
 
 def _request(node: int, data: bytes) -> Can:

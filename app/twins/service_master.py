@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Final
 
@@ -13,6 +13,7 @@ from app.twins.canopen_device import CanopenDevice
 from app.twins.line_client import Answer, LineClient
 from app.twins.ports import Line
 from app.twins.scenario import MasterDo, MasterOrder
+from app.wire.frame import Can
 from app.wire.nmt import NmtCommand
 
 SAVE: Final = Address(0x1010, 3)
@@ -60,6 +61,10 @@ class ServiceMaster:
             self._client.write(order.node, order.address, self._bytes(order), then)
         elif order.address is not None:
             self._client.read(order.node, order.address, then)
+
+    def on_send(self, told: Callable[[Can], None]) -> None:
+        """Have ``told`` called with every frame of this master, as it is queued."""
+        self._client.on_send = told
 
     def close(self) -> None:
         """Leave the line."""
