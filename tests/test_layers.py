@@ -40,6 +40,7 @@ ONLY_IN: dict[str, tuple[str, ...]] = {
     "serial": ("drivers/",),
     "viser": ("scene/",),
     "mcap": ("recording/",),
+    "numba": ("twins/",),
     "fastapi": ("web/",),
     "uvicorn": ("web/", "cli/", "cli.py"),
     "sqlalchemy": ("store/",),
