@@ -83,7 +83,8 @@ async def make_bench(arguments: argparse.Namespace, output: Output, record: bool
         known, first = _from_site_file(arguments, home)
     sites = Sites(known, lambda one: descriptions_for(sheets, one, arguments.site), arguments.site, home)
     spare_collector()
-    bench = Bench(sites, options_of(arguments, record), output.error, store=store)
+    instructor = arguments.instructor
+    bench = Bench(sites, options_of(arguments, record), output.error, store=store, instructor=instructor)
     return None if first is None else first.slug, bench
 
 

@@ -40,16 +40,19 @@ def run(arguments: argparse.Namespace, output: Output) -> int:
     data = arguments.settings.data
     with contextlib.ExitStack() as running:
         twins = running.enter_context(_twins(arguments, data / "twins", TWIN_PORT))
+        from app.cli.control_client import ControlClient
         from app.cli.serve import serve_turbine
 
-        address = _address(twins)
-        if address is None:  # the usual port is taken
+        started = _started(twins)
+        if started is None:  # the usual port is taken
             running.close()
             twins = running.enter_context(_twins(arguments, data / "twins", 0))
-            address = _address(twins)
-            if address is None:
+            started = _started(twins)
+            if started is None:
                 raise BusOpenError(bus="twins", reason=_reason(twins))
+        address, control = str(started["address"]), started["control"]
         arguments.site = _site(data, address)
+        arguments.instructor = ControlClient(control["address"], control["token"], address)
         return serve_turbine(arguments, output)
 
 
@@ -70,10 +73,11 @@ def _twins(arguments: argparse.Namespace, state: Path, port: int) -> Iterator[su
             process.wait(END_S)
 
 
-def _address(twins: subprocess.Popen[str]) -> str | None:
-    """Where the twins answer, as soon as they do; None where they ended instead."""
+def _started(twins: subprocess.Popen[str]) -> dict[str, Any] | None:
+    """What the twins say as soon as they answer: where, and how they are told; None where they ended instead."""
     line = twins.stdout.readline() if twins.stdout is not None else ""
-    return str(json.loads(line)["address"]) if line else None
+    started: dict[str, Any] | None = json.loads(line) if line else None
+    return started
 
 
 def _reason(twins: subprocess.Popen[str]) -> str:

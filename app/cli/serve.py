@@ -34,7 +34,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser.add_argument(
         "--host", action="append", default=[], metavar="NAME", help="a name under which browsers reach the page"
     )
-    parser.set_defaults(run=serve_turbine)
+    parser.set_defaults(run=serve_turbine, instructor=None)
 
 
 def serve_turbine(arguments: argparse.Namespace, output: Output) -> int:

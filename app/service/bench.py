@@ -151,6 +151,8 @@ class Bench:
     async def close(self) -> None:
         """End the connection at the end of the server, then the office."""
         await self.disconnect(self.options.person)
+        if self.desk is not None:
+            await self.desk.close()
         await self.office.close()
 
     async def _end(self, person: str) -> None:

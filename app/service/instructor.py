@@ -22,6 +22,7 @@ log = logging.getLogger(__name__)
 
 LOOK_S: Final = 1.0
 """How soon a fault is seen that ended of itself, or that somebody else has ordered."""
+_OWN_TIME: Final = ("duration_s", "off_s")
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +85,9 @@ class Instructor(Protocol):
 
     async def stop(self) -> None:
         """End the scenario that plays."""
+
+    async def close(self) -> None:
+        """End the connection to the twins; they go on."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -226,6 +230,10 @@ class InstructorDesk:
                 log.debug("the twins do not answer: %s", error)
             await asyncio.sleep(LOOK_S)
 
+    async def close(self) -> None:
+        """End the connection to the twins at the end of the server."""
+        await self._instructor.close()
+
     # -- inside ----------------------------------------------------------------------
 
     async def _checked(self, order: FaultOrder) -> FaultOrder:
@@ -313,7 +321,9 @@ async def watched(desk: InstructorDesk | None) -> AsyncIterator[None]:
 def _fault_line(fault: ActiveFault, line_now_ns: int, now_ns: int) -> InjectedLine:
     order = fault.order
     since_ns = now_ns - (line_now_ns - fault.since_ns)
-    until_ns = None if order.seconds is None else since_ns + round(order.seconds * 1e9)
+    # What ends of itself has its time among its values.
+    seconds = next((order.values[name] for name in _OWN_TIME if name in order.values), order.seconds)
+    until_ns = None if seconds is None else since_ns + round(seconds * 1e9)
     return InjectedLine(
         fault.id, order.kind, order.blade, order.node, dict(order.values), order.seconds, since_ns, until_ns
     )

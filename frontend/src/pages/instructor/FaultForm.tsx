@@ -1,12 +1,11 @@
 import { Button, SegmentedControl, Select, TextInput } from "@mantine/core";
-import { IconBug, IconHourglass } from "@tabler/icons-react";
+import { IconBug, IconCircleCheck, IconHourglass } from "@tabler/icons-react";
 import { useMutation } from "@tanstack/react-query";
 import type { SyntheticEvent } from "react";
 import { type FaultKind, type FaultParameter, instructing } from "../../api/instructor";
 import { NeedsRole } from "../../frame/NeedsRole";
 import { usePageSearch } from "../../frame/search";
 import { useTexts } from "../../texts/texts";
-import { notify } from "../../ui/notices";
 import { ProblemAlert } from "../../ui/ProblemAlert";
 import { useTyped } from "../../ui/useTyped";
 import {
@@ -40,15 +39,7 @@ export function FaultForm({ kind, answering }: { kind: FaultKind; answering: boo
   const place = usePlace(kind, nodes);
   const order = place === null ? null : orderOf(kind, place, typed);
   const name = t(`fault.${kind.id}.name`);
-  const inject = useMutation({
-    mutationFn: instructing.inject,
-    onSuccess: (fault) =>
-      notify({
-        tone: "ok",
-        title: t("page.instructor.injected", { fault: name, place: where(fault, kind.target === "bus") }),
-        lines: [t(kind.momentary ? "page.instructor.injected_momentary" : "page.instructor.injected_next")],
-      }),
-  });
+  const inject = useMutation({ mutationFn: instructing.inject });
   const type = (field: string, value: string | undefined) => {
     const next = new Map(typed);
     if (value === undefined) next.delete(field);
@@ -92,6 +83,16 @@ export function FaultForm({ kind, answering }: { kind: FaultKind; answering: boo
             </span>
           )}
         </div>
+        {inject.data && (
+          <p className={`${classes.done} tone-ok`} role="status" data-testid="injected-told">
+            <IconCircleCheck size={19} aria-hidden />
+            {t("page.instructor.injected", {
+              fault: name,
+              place: where(inject.data, kind.target === "bus"),
+            })}{" "}
+            {t(kind.momentary ? "page.instructor.injected_momentary" : "page.instructor.injected_next")}
+          </p>
+        )}
         {inject.error !== null && (
           <ProblemAlert error={inject.error} title={t("page.instructor.refused", { fault: name })} />
         )}
@@ -131,6 +132,7 @@ function Field({ field, typed, onType }: FieldProps) {
       <div>
         <span className={classes.label}>{label}</span>
         <SegmentedControl
+          className={classes.segments ?? ""}
           fullWidth
           data={data}
           value={value}

@@ -9,6 +9,7 @@ import classes from "./Instructor.module.css";
 import type { NodeChoice } from "./names";
 
 const WHOLE = "all";
+const SHARE = "percent";
 const BLADES = ["1", "2", "3"];
 
 /** Where the URL says that the fault is to go, as far as this kind can go there; null while no node is known. */
@@ -50,6 +51,7 @@ export function Target({ kind, nodes, place }: Props) {
       <div className={classes.target}>
         <span className={classes.label}>{label}</span>
         <SegmentedControl
+          className={classes.segments ?? ""}
           data={kind.target === "turbine" ? [whole, ...blades] : blades}
           value={place?.blade == null ? WHOLE : String(place.blade)}
           onChange={(blade) => update({ blade: blade === WHOLE ? undefined : blade })}
@@ -59,6 +61,8 @@ export function Target({ kind, nodes, place }: Props) {
       </div>
     );
   }
+  // What no share of the frames can be given for acts on the bus as a whole.
+  if (kind.target === "bus" && !kind.parameters.some(({ name }) => name === SHARE)) return null;
   return <NodeSelect kind={kind} nodes={nodes} place={place} label={label} />;
 }
 
