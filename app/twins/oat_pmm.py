@@ -119,7 +119,7 @@ class OatPmm(Application):
         self.errors.event(code)
 
     def memory_failed(self, t_ns: int) -> None:
-        """5530h (table 6); a PMC has no such code, its master learns of it by the abort alone."""
+        """The EEPROM could not be written (table 6)."""
         self.errors.event(_EEPROM_FAILED)
 
     # -- safety chain, link to the PMC, supply of both units --------------------------------
