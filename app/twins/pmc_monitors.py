@@ -25,7 +25,9 @@ _OVERSPEED_SHARE: Final = 1.2
 """OPEN the threshold of 8400h; 20 % above 6080h, for a controlled axis stays below."""
 _OVERLOAD_NS: Final = 10 * SECOND
 """OPEN when the current at the output is too high (2310h). The controller never lets it pass 6073h; so the error means
-that the axis got all that it may have for 10 s on end, twice as long as peak current lasts by default (60F6h/3)."""
+that the axis took all that it may have for long, or more, for 10 s on end: twice as long as peak current lasts by
+default (60F6h/3)."""
+_NOMINAL_PERMILLE: Final = 1000
 _LIMIT_PERMILLE: Final = 5
 """So near to a limit the current counts as limited."""
 _NEEDED: Final = ((0x6076, 0), (0x6410, 1), (0x6410, 3), (0x6410, 4), (0x6410, 6))
@@ -129,10 +131,8 @@ class Monitors:
 
     def _watch_current(self, t_ns: int) -> None:
         """2310h."""
-        highest, now = self._store.number(0x6073), self._drive.current_permille
-        at_peak = now >= highest - _LIMIT_PERMILLE
-        at_nominal = highest > 1000 and abs(now - 1000) <= _LIMIT_PERMILLE
-        if not (self._drive.energised and highest > 2 * _LIMIT_PERMILLE and (at_peak or at_nominal)):
+        limit = min(self._store.number(0x6073), _NOMINAL_PERMILLE) - _LIMIT_PERMILLE
+        if not self._drive.energised or limit <= 0 or self._drive.current_permille < limit:
             self._limited_since_ns = t_ns
         elif t_ns - self._limited_since_ns >= _OVERLOAD_NS:
             self._limited_since_ns = t_ns
