@@ -7,13 +7,16 @@ are enforced here with the abort codes of CiA 301 (table 22), whoever writes.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from app.model.address import Address
 from app.model.checks import limits_of
 from app.model.datatypes import DataType, Raw, decode_raw, encode_raw
 from app.model.description import Access, Description, Entry
 from app.wire.sdo import Abort
+
+_FIRST_OF_MAKER: Final = 0x2000
+"""Below it sub-index 0 may tell how many of the elements are in use (CiA 301)."""
 
 
 class RefusedAccessError(Exception):
@@ -102,6 +105,7 @@ class ObjectStore:
         # Controllers look objects up some ten thousand times a second; an int is hashed faster than an address.
         self._by_number = {address.major << 8 | address.minor: cell for address, cell in self._cells.items()}
         self._link_mirrors()
+        self._count_elements()
 
     def __iter__(self) -> Iterator[Cell]:
         return iter(self._cells.values())
@@ -211,6 +215,20 @@ class ObjectStore:
             cell.source = _mirror_source(target, mirror.divisor)
             if cell.entry.access.writable:
                 cell.effect = _mirror_effect(self, target, mirror.divisor)
+
+    def _count_elements(self) -> None:
+        """Sub-index 0 counts the elements, also where fewer are printed than described (6410h: 12 and 15)."""
+        last: dict[int, int] = {}
+        for address in self._cells:
+            last[address.major] = max(last.get(address.major, 0), address.minor)
+        for index, count in last.items():
+            cell = self.find(index)
+            if index >= _FIRST_OF_MAKER and cell is not None and count and cell.raw != count:
+                cell.source = _constant(count)
+
+
+def _constant(number: int) -> Callable[[], Raw]:
+    return lambda: number
 
 
 def _mirror_source(target: Cell, divisor: int) -> Callable[[], Raw]:
