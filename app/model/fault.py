@@ -191,7 +191,7 @@ def check_order(order: FaultOrder) -> FaultOrder:
     for name in order.values:
         if name not in known:
             _wrong(name, f"{kind.id} has no such value")
-    values = {name: _value(parameter, order.values.get(name)) for name, parameter in known.items()}
+    values = {name: _value(one, order.values.get(name, one.default)) for name, one in known.items()}
     if "first_id" in values and values["first_id"] > values["last_id"]:
         _wrong("first_id", "is above last_id")
     return FaultOrder(kind.id, order.blade, order.node, values, order.seconds)
@@ -215,9 +215,7 @@ def _check_place(kind: FaultKind, order: FaultOrder) -> None:
             _wrong("node", f"is {order.node!r}, not 1 to {MAX_NODE}")
 
 
-def _value(parameter: FaultParameter, given: float | None) -> float:
-    if given is None:
-        return parameter.default
+def _value(parameter: FaultParameter, given: float) -> float:
     value = _between(parameter.name, given, parameter.low, parameter.high)
     if parameter.integer and value != int(value):
         _wrong(parameter.name, f"is {given!r}, no whole number")

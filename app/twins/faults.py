@@ -132,12 +132,17 @@ class Instructor:
         return self._player if self._player is not None and self._player.playing else None
 
     def play(self, scenario: Scenario) -> ScenarioPlayer:
-        """Play a scenario from now on, in place of one that plays; faults that act end. Raises UsageError."""
+        """Play a scenario from now on, in place of one that plays; faults that act end.
+
+        Raises UsageError where these twins cannot; all is as before then.
+        """
+        player = ScenarioPlayer(scenario, Stage(self._line, self._turbine, self._surroundings, self))
         self.stop()
         self.clear_all()
         self._seed, self._draws = scenario.seed, 0
-        self._player = ScenarioPlayer(scenario, Stage(self._line, self._turbine, self._surroundings, self))
-        return self._player
+        player.begin()
+        self._player = player
+        return player
 
     def stop(self) -> None:
         """End the scenario that plays, if one does."""

@@ -54,24 +54,34 @@ class Stage:
 
 
 class ScenarioPlayer:
-    """One scenario that plays from the line's present time on, until its time is over or ``stop`` is called.
+    """One scenario, which plays from ``begin`` on until its time is over or ``stop`` is called.
 
-    What cannot be done on these twins is told at once: UsageError, and nothing has happened.
+    What cannot be done on these twins is told before: UsageError, and nothing has happened.
     """
 
     def __init__(self, scenario: Scenario, stage: Stage) -> None:
         self.scenario = scenario
         self.since_ns = stage.line.now_ns
-        self.playing = True
+        self.playing = False
         self.controller: TurbineController | None = None
         self._stage = stage
         self.master = ServiceMaster(stage.line, stage.turbine.devices)
+        self._places = self._presets()
         try:
             self._check()
+        except UsageError:
+            self.master.close()
+            raise
+
+    def begin(self) -> None:
+        """Play from now on. Raises UsageError where a unit refuses a value of before; nothing plays then."""
+        self.since_ns = self._stage.line.now_ns
+        try:
             self._preset()
         except UsageError:
             self.master.close()
             raise
+        self.playing = True
         self._begin()
 
     def stop(self) -> None:
@@ -92,6 +102,8 @@ class ScenarioPlayer:
         start, stage = self.scenario.start, self._stage
         if stage.surroundings is None and (start.wind_mps is not None or start.controller):
             raise UsageError(reason="these twins have no wind and no rotor", field="start")
+        for preset, device in self._places:
+            _preset_bytes(preset, device)
         rehearsal = TurbineController(CanLine(stage.line.bitrate), Rotor(seed=0))
         for event in self.scenario.events:
             if isinstance(event.action, FaultOrder):
@@ -101,16 +113,17 @@ class ScenarioPlayer:
             elif isinstance(event.action, Control):
                 rehearsal.command(event.action.table)
 
-    def _preset(self) -> None:
-        """All values are looked at before the first one is written."""
-        places = [
+    def _presets(self) -> list[tuple[Preset, CanopenDevice]]:
+        return [
             (preset, blade.pmc.device if preset.unit is Unit.PMC else blade.pmm.device)
             for preset in self.scenario.presets
             for blade in self._stage.turbine.blades
             if preset.blade in (None, blade.number)
         ]
-        encoded = [_preset_bytes(preset, device) for preset, device in places]
-        for (preset, device), data in zip(places, encoded, strict=True):
+
+    def _preset(self) -> None:
+        for preset, device in self._places:
+            data = _preset_bytes(preset, device)
             try:
                 device.store.write(preset.address, data)
             except RefusedAccessError as error:
