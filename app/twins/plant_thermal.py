@@ -35,7 +35,9 @@ class ThermalConstants:
     box_w_per_k: float = 1.5
     """A closed box of about half a square metre at 3 W/(m2 K)."""
     fan_factor: float = 3.0
-    """What moving air makes of the conductances of blocs, box and places."""
+    """What moving air makes of the conductance of the blocs."""
+    wall_fan_factor: float = 1.3
+    """The same for the walls of box and places, where the outer side stays still."""
     box_heater_w: float = 80.0
     box_cooler_w: float = 80.0
     """A small mat, a small thermoelectric cooler."""
@@ -107,7 +109,7 @@ class ThermalPlant:
         constants, climate = self.constants, self.battery_climate
         stir = constants.fan_factor if climate.fan else 1.0
         box_w = climate.power_w(constants.box_heater_w, constants.box_cooler_w)
-        box_w -= (self.box_c - hub_c) * constants.box_w_per_k * stir
+        box_w -= (self.box_c - hub_c) * constants.box_w_per_k * (constants.wall_fan_factor if climate.fan else 1.0)
         for bloc, loss_w in zip(blocs, losses.blocs_w, strict=True):
             out_w = (bloc.temperature_c - bloc.warmer_c - self.box_c) * constants.bloc_w_per_k * stir
             bloc_w = loss_w + self.extra_battery_w / len(blocs) - out_w
@@ -120,5 +122,5 @@ class ThermalPlant:
         for number, climate in enumerate(self.place_climates):
             above_c = self.places_c[number] - hub_c - self.places_warmer_c[number]
             heat_w = climate.power_w(constants.place_heater_w, constants.place_cooler_w)
-            heat_w -= above_c * constants.place_w_per_k * (constants.fan_factor if climate.fan else 1.0)
+            heat_w -= above_c * constants.place_w_per_k * (constants.wall_fan_factor if climate.fan else 1.0)
             self.places_c[number] += heat_w / constants.place_j_per_k * dt_s
