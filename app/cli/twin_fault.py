@@ -1,20 +1,24 @@
-"""``hubside twin fault``: faults and scenarios of twins that run."""
+"""``hubside twin fault``: faults and scenarios of twins that run.
+
+What the commands need is loaded when one is run: ``hubside twin oat`` has this module too, and shall start soon.
+"""
 
 from __future__ import annotations
 
 import argparse
-import asyncio
 import os
 from collections.abc import Awaitable, Callable
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
-from app.cli.control_client import ControlClient
 from app.cli.output import Output
 from app.errors import UsageError
 from app.model.fault import FaultKind, FaultOrder, active_table, kind_table, order_from_words
 
-Run = Callable[[argparse.Namespace, Output, ControlClient], Awaitable[None]]
+if TYPE_CHECKING:
+    from app.cli.control_client import ControlClient
+
+Run = Callable[[argparse.Namespace, Output, "ControlClient"], Awaitable[None]]
 TOKEN_VARIABLE: Final = "HUBSIDE_TWIN_TOKEN"
 _ALL: Final = "all"
 
@@ -30,7 +34,7 @@ def add_parser(kinds: argparse._SubParsersAction[argparse.ArgumentParser]) -> No
         one.add_argument(
             "--token", default=os.environ.get(TOKEN_VARIABLE), help=f"their secret; default: {TOKEN_VARIABLE}"
         )
-        one.set_defaults(run=lambda arguments, output: asyncio.run(_with_twins(arguments, output, run)))
+        one.set_defaults(run=lambda arguments, output: _run(arguments, output, run))
         return one
 
     action("kinds", _kinds, "all kinds of fault, with what can be said of them")
@@ -46,9 +50,17 @@ def add_parser(kinds: argparse._SubParsersAction[argparse.ArgumentParser]) -> No
     action("stop", _stop, "end the scenario that plays")
 
 
+def _run(arguments: argparse.Namespace, output: Output, run: Run) -> int:
+    import asyncio
+
+    return asyncio.run(_with_twins(arguments, output, run))
+
+
 async def _with_twins(arguments: argparse.Namespace, output: Output, run: Run) -> int:
     if not arguments.token:
         raise UsageError(reason=f"the twins' secret is missing: --token, or {TOKEN_VARIABLE}")
+    from app.cli.control_client import ControlClient
+
     client = ControlClient(arguments.control, arguments.token)
     try:
         await run(arguments, output, client)
@@ -134,8 +146,7 @@ async def _scenarios(_arguments: argparse.Namespace, output: Output, client: Con
 async def _play(arguments: argparse.Namespace, output: Output, client: ControlClient) -> None:
     name = arguments.scenario
     if "." in name or "/" in name or "\\" in name:
-        text = await asyncio.to_thread(_read, Path(name))
-        await client.play_text(text, name)
+        await client.play_text(_read(Path(name)), name)
     else:
         await client.play(name)
     output.say("cli.scenario_begun", scenario=name)
