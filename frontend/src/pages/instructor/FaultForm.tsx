@@ -25,8 +25,8 @@ import classes from "./Instructor.module.css";
 import { choicesOf, parameterName, useNodeChoices, useWhere } from "./names";
 import { Target, usePlace } from "./Target";
 
-/** As many choices still stand side by side. */
-const MOST_BUTTONS = 3;
+/** As many letters of choices still stand side by side. */
+const MOST_LETTERS = 20;
 
 /** One kind of fault: what it does, where, with which values, for how long. One click injects it. */
 export function FaultForm({ kind, answering }: { kind: FaultKind; answering: boolean }) {
@@ -116,7 +116,7 @@ function Field({ field, typed, onType }: FieldProps) {
     const data = choices.map((one) => ({ value: String(one.value), label: one.name }));
     const onChange = (chosen: string | null) =>
       onType(field.name, chosen === null || Number(chosen) === field.default ? undefined : chosen);
-    if (choices.length > MOST_BUTTONS) {
+    if (choices.map((one) => one.name).join("").length > MOST_LETTERS) {
       return (
         <Select
           label={label}

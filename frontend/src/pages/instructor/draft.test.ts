@@ -54,7 +54,7 @@ describe("what is typed", () => {
 
 describe("numbers as people know them", () => {
   it("are hexadecimal for identifiers and have a comma in German", () => {
-    expect(numberText(parameter({ name: "can_id" }), 0x10, "en")).toBe("010h");
+    expect(numberText(parameter({ name: "can_id", high: 0x7ff }), 0x10, "en")).toBe("010h");
     expect(numberText(parameter(), 0.1, "de")).toBe("0,1");
     expect(limitsOf(parameter(), "de")).toBe("0,1 … 100 %");
   });

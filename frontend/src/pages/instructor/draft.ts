@@ -41,7 +41,8 @@ export const isHex = (parameter: FaultParameter): boolean => HEXADECIMAL.has(par
 
 /** A number as it is typed and shown; the manuals' hexadecimal where the number is known so. */
 export function numberText(parameter: FaultParameter, number: number, language: Language): string {
-  if (isHex(parameter)) return `${number.toString(16).toUpperCase().padStart(3, "0")}h`;
+  const digits = parameter.high.toString(16).length;
+  if (isHex(parameter)) return `${number.toString(16).toUpperCase().padStart(digits, "0")}h`;
   return localise(String(number), language);
 }
 

@@ -61,16 +61,16 @@ export function parameterName(parameter: FaultParameter, t: Translate): string {
   return parameter === DURATION ? t("page.instructor.seconds") : t(`fault_parameter.${parameter.name}`);
 }
 
-/** `Remaining voltage 0 %, Phase L1` */
+/** `Remaining voltage 0 %, Phase L1`: the first value, and of the others those that are not the usual ones. */
 export function valuesText(
   fault: InjectedFault,
   parameters: readonly FaultParameter[],
   t: Translate,
 ): string {
   return parameters
-    .flatMap((parameter) => {
+    .flatMap((parameter, at) => {
       const number = fault.values[parameter.name];
-      if (number === undefined) return [];
+      if (number === undefined || (at > 0 && number === parameter.default)) return [];
       const named = choicesOf(parameter, t).find(({ value }) => value === number)?.name;
       const plain = `${numberText(parameter, number, t.language)} ${parameter.unit}`.trim();
       return [`${parameterName(parameter, t)} ${named ?? plain}`];
