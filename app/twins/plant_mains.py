@@ -13,6 +13,7 @@ from app.twins.supply_kernel import DT_S, TABLE_LENGTH
 _FREQUENCY_HZ: Final = 50.0
 _LOST_SHARE: Final = 0.05
 """A phase with less than this is open: it then floats, and no line voltage with it drives a current."""
+_SOUND: Final = [1.0, 1.0, 1.0]
 _SAMPLES: Final = 20
 """Looks at the sine in a cycle of 1 ms (50 us: the highest is found to 0.01 %)."""
 
@@ -65,6 +66,9 @@ class Mains:
 
         |a - b e^(-j120)| = sqrt(a^2 + b^2 + a b); the terminal of an open phase floats half-way between the other two.
         """
+        if self.phases == _SOUND:
+            sound_v = self.sound_v
+            return (sound_v, sound_v, sound_v)
         pairs = ((0, 1), (1, 2), (2, 0))
         lost = [share <= _LOST_SHARE for share in self.phases]
         if sum(lost) > 1:

@@ -143,7 +143,7 @@ class PowerPlant:
     _phase: float = 0.0
     _slow_cycle: float = 0.0
     _booked: tuple[float, ...] = (0.0,) * 6
-    _table: tuple[float, ...] = ()
+    _phases_seen: list[float] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         """Begin warm and charged, slightly different for each seed."""
@@ -186,10 +186,9 @@ class PowerPlant:
         """Hand commands and slow values to the kernel, before it runs."""
         p, commands = self.p, self.commands
         p[k.MAINS_PEAK_V] = self.mains.peak_v
-        table = self.mains.table()
-        if table is not self._table:
-            self._table = table
-            p[k.LINE_TABLE : k.LINE_TABLE + k.TABLE_LENGTH] = table
+        if self.mains.phases != self._phases_seen:
+            self._phases_seen = list(self.mains.phases)
+            p[k.LINE_TABLE : k.LINE_TABLE + k.TABLE_LENGTH] = self.mains.table()
         p[k.SUPPLY_W] = self.adapter_w
         p[k.ELECTRONICS_W] = self.constants.idle_load_w + self.extra_load_w
         p[k.UNIT_ON] = float(commands.enabled)

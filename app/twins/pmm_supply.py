@@ -56,6 +56,11 @@ class PmmSupply:
         self._now_ns = self._boost_until_ns = 0
         self._failed_since_ns: int | None = None
         self._chopper_mean_w = self._chopper_j = 0.0
+        # Looked at in every tick: what it costs to find them counts.
+        self._most_v, self._least_v = store.cell(0x30FA, 2), store.cell(0x30FA, 3)
+        self._limit_a, self._target_v, self._start_v = (store.cell(0x30FB, sub) for sub in (3, 7, 8))
+        self._chopper_on_v, self._chopper_off_v = store.cell(0x30FC, 1), store.cell(0x30FC, 2)
+        self._blocs, self._bloc_mv = store.cell(0x3020, 4), store.cell(0x3020, 5)
         for low, high in pairwise(_ORDER):
             store.cell(*high).guard = _all_of(store.cell(*high).guard, _above(store, *low))
             store.cell(*low).guard = _all_of(store.cell(*low).guard, _below(store, *high))
@@ -128,28 +133,29 @@ class PmmSupply:
         two phases give. The highest line voltage counts: the DC link lives on it, so a lost phase is no failure.
         """
         power, errors = self._power, self._errors
-        failed = not self.mains_back
+        line_v = power.mains.line_v
+        highest_v, nominal_v = max(line_v), power.constants.mains_v
+        failed = highest_v < nominal_v * _MAINS_LOW_SHARE
         if not failed:
             self._failed_since_ns = None
         elif self._failed_since_ns is None:
             self._failed_since_ns = self._now_ns
-        highest_v = power.mains_now_v
         errors.warning(MAINS_LOW, failed)
-        errors.warning(MAINS_HIGH, highest_v > power.constants.mains_v * _MAINS_HIGH_SHARE)
-        errors.warning(PHASE_FAILED, not failed and min(power.mains.line_v) < _PHASE_SHARE * highest_v)
+        errors.warning(MAINS_HIGH, highest_v > nominal_v * _MAINS_HIGH_SHARE)
+        errors.warning(PHASE_FAILED, not failed and min(line_v) < _PHASE_SHARE * highest_v)
 
     # -- power stages ------------------------------------------------------------------------
 
     def _command(self) -> None:
         """Thresholds of 30FBh and 30FCh; the stages themselves act on them within a cycle."""
-        number, commands = self._store.number, self._power.commands
-        commands.mains_failed = self.failed
-        commands.booster_start_v = number(0x30FB, 8)
-        commands.booster_target_v = number(0x30FB, 7)
-        commands.booster_limit_a = number(0x30FB, 3)
-        commands.battery_least_v = BATTERY_LEAST_SHARE * number(0x3020, 5) / 1000 * number(0x3020, 4)
-        commands.chopper_on_v = number(0x30FC, 1)
-        commands.chopper_off_v = number(0x30FC, 2)
+        commands = self._power.commands
+        commands.mains_failed = self._failed_since_ns is not None
+        commands.booster_start_v = self._start_v.number
+        commands.booster_target_v = self._target_v.number
+        commands.booster_limit_a = self._limit_a.number
+        commands.battery_least_v = BATTERY_LEAST_SHARE * self._bloc_mv.number / 1000 * self._blocs.number
+        commands.chopper_on_v = self._chopper_on_v.number
+        commands.chopper_off_v = self._chopper_off_v.number
         commands.chopper_on = self._test_loads()
         commands.booster_on = commands.chopper_on or self._now_ns < self._boost_until_ns
 
@@ -160,14 +166,15 @@ class PmmSupply:
             self._chopper_j += burnt_j
 
     def _watch_voltages(self) -> None:
-        power, errors, number = self._power, self._errors, self._store.number
-        errors.error(DC_LINK_LOW, power.dc_link_v < number(0x30FA, 3))
-        errors.error(DC_LINK_HIGH, power.dc_link_v > number(0x30FA, 2))
+        power, errors = self._power, self._errors
+        dc_link_v, supply_mv, supply_ma = power.dc_link_v, power.supply_v * 1000, power.supply_a * 1000
+        errors.error(DC_LINK_LOW, dc_link_v < self._least_v.number)
+        errors.error(DC_LINK_HIGH, dc_link_v > self._most_v.number)
         errors.error(BOOSTER_SHORT, Stage.BOOSTER in power.shorted)
         errors.error(CHOPPER_SHORT, Stage.CHOPPER in power.shorted)
-        errors.error(SUPPLY_OVERLOAD, self._supply_ma() > _SUPPLY_MOST_MA)
-        errors.error(SUPPLY_LOW, power.supply_v * 1000 < _SUPPLY_LOW_MV)
-        errors.error(SUPPLY_HIGH, power.supply_v * 1000 > _SUPPLY_HIGH_MV)
+        errors.error(SUPPLY_OVERLOAD, supply_ma > _SUPPLY_MOST_MA)
+        errors.error(SUPPLY_LOW, supply_mv < _SUPPLY_LOW_MV)
+        errors.error(SUPPLY_HIGH, supply_mv > _SUPPLY_HIGH_MV)
 
     # -- objects -----------------------------------------------------------------------------
 
