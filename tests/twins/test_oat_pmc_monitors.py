@@ -246,7 +246,7 @@ def test_a_motor_that_runs_away_is_turned_off(rig: BladeRig) -> None:
     in_motion(rig)
     rig.put("6080", 1000)
     rig.master.run(10 * MS)
-    assert rig.errors()[0] == 0x8400
+    assert next(iter(rig.errors())) == 0x8400
     assert not rig.pmc.drive.energised
     rig.put("6080", 3000)
     rig.run_until(lambda: rig.get("6044") == 0)

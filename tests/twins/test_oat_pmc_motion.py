@@ -8,6 +8,7 @@ import pytest
 
 from app.twins.axis_scaling import motor_scaling, units_per_increment
 from app.twins.cia402 import State
+from app.twins.plant import BrakeFault
 from tests.twins.harness import MS, SECOND
 from tests.twins.oat_rig import ENABLE, NEW_TARGET, QUICK_STOP, SHUTDOWN, START, SWITCH_ON, BladeRig
 
@@ -141,6 +142,7 @@ def test_without_velocity_nothing_moves(rig: BladeRig) -> None:
 
 @pytest.mark.rule("M15")
 def test_motor_speed_is_limited(rig: BladeRig) -> None:
+    assert rig.get("6080") == 3000
     rig.put("6080", 1000)
     rig.put("6065", 0xFFFFFFFF)
     rig.enable()
@@ -212,6 +214,33 @@ def test_following_error_shows_before_its_time_is_over(rig: BladeRig) -> None:
 
 
 @pytest.mark.rule("M1")
+@pytest.mark.parametrize(("sign", "target"), [(-1, 2000), (1, 8800)])
+def test_following_error_is_target_minus_actual(rig: BladeRig, sign: int, target: int) -> None:
+    rig.put("60FB:02", 0)
+    rig.enable()
+    rig.go(target)
+    rig.run_until(lambda: abs(rig.get("606C")) > 700, 2 * SECOND)
+    assert rig.get("60F4") * sign > 20
+
+
+@pytest.mark.rule("M1")
+def test_following_error_trips_only_after_its_time(rig: BladeRig) -> None:
+    assert (rig.get("6065"), rig.get("6066")) == (100, 10)
+    rig.put("6066", 1000)
+    rig.enable()
+    rig.blade.axis.brake_stuck = BrakeFault.ENGAGED
+    rig.go(2000)
+    rig.wait_bit(BIT_13)
+    assert abs(rig.get("60F4")) >= 100
+    rig.master.run(900 * MS)
+    assert rig.errors() == []
+    assert rig.bit(BIT_13)
+    rig.master.run(150 * MS)
+    assert rig.errors() == [0x8611]
+    rig.wait_state(State.FAULT)
+
+
+@pytest.mark.rule("M1")
 def test_following_error_window_off(rig: BladeRig) -> None:
     rig.put("6065", 0xFFFFFFFF)
     rig.enable()
@@ -223,13 +252,18 @@ def test_following_error_window_off(rig: BladeRig) -> None:
 
 
 @pytest.mark.rule("N7")
-def test_following_error_without_feed_forward(rig: BladeRig) -> None:
-    rig.put("60FB:02", 0)
+@pytest.mark.parametrize(("gain", "precontrol"), [(17, 0), (17, 500), (17, 1000), (40, 0), (8, 250)])
+def test_following_error_by_gain_and_precontrol(rig: BladeRig, gain: int, precontrol: int) -> None:
+    assert (rig.get("60FB:01"), rig.get("60FB:02")) == (17, 1000)
+    rig.put("60FB:01", gain)
+    rig.put("60FB:02", precontrol)
     rig.enable()
     rig.go(2000)
     rig.master.run(2 * SECOND)
-    assert rig.get("60F4") == pytest.approx(-800 / 17, abs=1.5)
-    assert rig.get("50F4") == pytest.approx(-800 / 17, abs=1.5)
+    rig.blade.advance(rig.line.now_ns)
+    expected = -800 / gain * (1 - precontrol / 1000)
+    assert rig.pmc.drive.following_error == pytest.approx(expected, rel=0.02, abs=0.4)
+    assert rig.get("60F4") == pytest.approx(expected, rel=0.02, abs=1)
 
 
 @pytest.mark.rule("M2")
@@ -242,6 +276,43 @@ def test_target_reached_waits_for_the_window_time(rig: BladeRig) -> None:
     began_ns = rig.line.now_ns
     rig.wait_bit(TARGET_REACHED)
     assert (rig.line.now_ns - began_ns) / MS == pytest.approx(450, abs=80)
+
+
+@pytest.mark.rule("M2")
+@pytest.mark.parametrize("window", [2, 200])
+def test_target_reached_looks_at_the_window(rig: BladeRig, window: int) -> None:
+    """Held some units off by its load, the axis has reached its target for the wide window only."""
+    rig.put("6067", window)
+    rig.put("6065", 0xFFFFFFFF)
+    rig.put("60FB:02", 0)
+    rig.put("60F9:02", 0)
+    rig.put("60F9:01", 20)
+    rig.enable()
+    rig.blade.axis.load_torque_nm = 15.0
+    rig.go(7900)
+    rig.master.run(5 * SECOND)
+    assert 2 < abs(rig.get("6064") - 7900) < 200
+    assert rig.bit(TARGET_REACHED) is (window == 200)
+
+
+@pytest.mark.rule("M2")
+def test_with_a_time_of_0_the_first_moment_in_the_window_counts(rig: BladeRig) -> None:
+    assert (rig.get("6067"), rig.get("6068")) == (10, 10)
+    times = []
+    for time_ms in (0, 300):
+        rig.put("6068", time_ms)
+        rig.put("6060", 1)
+        rig.enable()
+        target = rig.get("6064") - 100
+        rig.go(target)
+        rig.master.until(lambda target=target: rig.pmc.drive.profile.position == target, step_ns=MS)  # type: ignore[misc]
+        began_ns = rig.line.now_ns
+        rig.master.until(lambda: rig.bit(TARGET_REACHED), step_ns=MS)
+        times.append((rig.line.now_ns - began_ns) / MS)
+        rig.command(SHUTDOWN)
+        rig.wait_state(State.READY)
+    assert times[0] < 20
+    assert times[1] == pytest.approx(300, abs=120)
 
 
 @pytest.mark.rule("K14")
@@ -360,6 +431,42 @@ def test_polarity_looks_at_bit_7_only(rig: BladeRig) -> None:
     assert rig.get("6064") == -plain
 
 
+@pytest.mark.rule("M11")
+def test_polarity_of_the_additional_encoder(rig: BladeRig) -> None:
+    rig.put("6060", 6)
+    rig.put("687C", 0)
+    plain = rig.get("6864")
+    rig.pmc.device.store.cell(0x687E).raw = 0x40
+    rig.pmc.drive.refresh_blade()
+    assert rig.get("6864") == plain
+    rig.put("687E", 0xC0)
+    assert rig.get("6864") == -plain
+
+
+@pytest.mark.rule("M11")
+def test_a_negative_polarity_turns_the_reference_too(rig: BladeRig) -> None:
+    rig.put("6060", 6)
+    rig.put("607E", 0xC0)
+    rig.put("607A", 5000)
+    rig.command(SHUTDOWN, SHUTDOWN | 0x10)
+    rig.enable()
+    rig.move(5300)
+    assert rig.get("6064") == pytest.approx(5300, abs=2)
+    assert rig.angle_deg == pytest.approx(77.0, abs=0.05)
+
+
+@pytest.mark.rule("M10")
+def test_the_additional_encoder_can_control_the_position(rig: BladeRig) -> None:
+    rig.put("6060", 6)
+    rig.put("687C", rig.get("687C") + 300)
+    rig.put("606A", -1)
+    assert rig.get("6064") == rig.get("6864") == 8300
+    rig.enable()
+    rig.move(8000)
+    assert rig.get("6864") == pytest.approx(8000, abs=6)
+    assert rig.angle_deg == pytest.approx(77.0, abs=0.1)
+
+
 @pytest.mark.rule("M10")
 def test_sensor_selection(rig: BladeRig) -> None:
     rig.put("6060", 6)
@@ -425,7 +532,7 @@ def test_a_mirror_is_saved_through_its_object(rig: BladeRig) -> None:
 
 
 @pytest.mark.rule("M13")
-def test_touch_probe(rig: BladeRig) -> None:
+def test_touch_probe_keeps_the_position_of_each_edge(rig: BladeRig) -> None:
     rig.pmc.inputs.probe = True
     rig.master.run(50 * MS)
     assert (rig.get("60BA"), rig.get("60BB")) == (8000, 0)
@@ -433,7 +540,21 @@ def test_touch_probe(rig: BladeRig) -> None:
     rig.move(7900)
     rig.pmc.inputs.probe = False
     rig.master.run(50 * MS)
+    assert rig.get("60BA") == 8000
     assert rig.get("60BB") == pytest.approx(7900, abs=2)
+
+
+@pytest.mark.rule("M13")
+@pytest.mark.parametrize("late_ms", [1, 2, 3, 4])
+def test_touch_probe_is_as_exact_as_1_ms_of_motion(rig: BladeRig, late_ms: int) -> None:
+    rig.enable()
+    rig.go(2000)
+    rig.master.run(1500 * MS)
+    rig.blade.advance(rig.line.now_ns)
+    before = rig.pmc.drive.position
+    rig.line.run_until(rig.line.now_ns + late_ms * MS)
+    rig.pmc.inputs.probe = True
+    assert rig.get("60BA") == pytest.approx(before - 0.8 * late_ms, abs=0.9)  # 800 units/s
 
 
 @pytest.mark.rule("M14")
@@ -442,11 +563,26 @@ def test_peak_current_is_limited_in_time(rig: BladeRig) -> None:
     rig.put("6065", 0xFFFFFFFF)
     rig.put("60F6:03", 500)
     rig.enable()
-    rig.blade.axis.load_torque_nm = 61.0
+    rig.blade.axis.brake_stuck = BrakeFault.ENGAGED
+    rig.go(2000)
+    rig.master.run(450 * MS)
+    assert rig.get("6078") == pytest.approx(2000, abs=5)
     rig.master.run(300 * MS)
-    assert rig.get("6078") > 1900
-    rig.master.run(300 * MS)
-    assert rig.get("6078") == 1000
+    assert rig.get("6078") == pytest.approx(1000, abs=5)
+
+
+@pytest.mark.rule("M14")
+@pytest.mark.parametrize("permille", [300, 1400])
+def test_the_current_limit_can_be_lowered(rig: BladeRig, permille: int) -> None:
+    assert (rig.get("6073"), rig.get("60F6:03")) == (2000, 5000)
+    rig.put("6073", permille)
+    rig.put("6065", 0xFFFFFFFF)
+    rig.enable()
+    rig.blade.axis.brake_stuck = BrakeFault.ENGAGED
+    rig.go(2000)
+    rig.master.run(400 * MS)
+    assert rig.get("6078") == pytest.approx(permille, abs=5)
+    assert rig.get("6077") == pytest.approx(-permille, abs=5)
 
 
 @pytest.mark.rule("J15")
