@@ -285,9 +285,14 @@ class AxisDrive:
         return self._operating and not self.halted
 
     @property
+    def cyclic(self) -> bool:
+        """Set-points come in a cycle (modes 8 and 9)."""
+        return self.mode is Mode.CYCLIC_POSITION or self.mode is Mode.CYCLIC_VELOCITY
+
+    @property
     def target_reached(self) -> bool:
         """Statusword bit 10 by mode and halt (manual, below table 53)."""
-        if self.mode in (Mode.CYCLIC_POSITION, Mode.CYCLIC_VELOCITY):
+        if self.cyclic:
             return True
         if self.halted and self._operating:
             return self.at_rest
@@ -386,12 +391,12 @@ class AxisDrive:
             self._hold_at(self._current_limit_deceleration())
             self._cyclic, self._cyclic_halted = None, True
             return
-        velocity, acceleration, deceleration = self._motion_limits()
         position = self._limited_position(self._store.number(0x607A) + self._store.number(0x60B0))
         if self._cyclic_halted:  # back to position control without a ramp
             self._cyclic_halted = False
             self.profile.put(position)
         if self._cyclic is None or self._cyclic.position != position:
+            velocity, acceleration, deceleration = self._motion_limits()
             before, self._cyclic = self._cyclic, Target(position, velocity, acceleration, deceleration)
             self._approach(self._cyclic, 0.0 if before is None else position - before.position)
         self.plant.p[k.EXTRA_VELOCITY] = self._store.number(0x60B1)

@@ -23,12 +23,15 @@ from app.wire.nmt import NmtState
 from app.wire.sdo import Abort
 
 TICK_BUSY_NS: Final = 5 * MS
-"""How often it is called while the axis needs its cycles."""
+"""How often it is called while what the axis does must be looked at closely: it stops, reaches something, feathers."""
+TICK_CYCLIC_NS: Final = 10 * MS
+"""The same while it only follows cyclic set-points, which are taken when they come."""
 TICK_IDLE_NS: Final = 20 * MS
 _CYCLE_NS: Final = MS
 _ENCODER_CODES: Final = frozenset((0x7300, 0x7305, 0x7320))
 _BLADE_ENCODER_CODES: Final = frozenset((0x7300, 0x7321))
 """Errors with which the position by that encoder is not to be trusted."""
+_CYCLIC_SET_POINTS: Final = (0x607A, 0x60B0, 0x60B1, 0x60FF)
 _AUTOSTART: Final = 1 << 0
 _BEYOND_SWITCHES: Final = 1 << 14
 """60FBh/3: the axis may pass limit switches while the node is not operational."""
@@ -58,6 +61,8 @@ class OatPmc(Application):
         self.drive = AxisDrive(self._store, plant)
         self.monitors = Monitors(self._store, plant, power, self.drive, self.errors)
         self.machine = StateMachine(self.drive)
+        self.catch_up: Callable[[int], None] = self.run_cycles
+        """Brings the axis to a time; whoever gives it a supply brings that along."""
         self.link: UnitLink[SupplyReport] | None = None
         self.manual = ManualFunction(self._store, self._sent_manual, self._reset_by_object)
         self._edges = Edges(plant, self.drive, self.inputs)
@@ -192,11 +197,13 @@ class OatPmc(Application):
     @property
     def tick_ns(self) -> int:
         """How long until the next ``tick`` is wanted."""
+        if self.drive.follows and self.drive.cyclic and not self.machine.feathering:
+            return TICK_CYCLIC_NS
         return TICK_BUSY_NS if self.drive.busy else TICK_IDLE_NS
 
     def tick(self, t_ns: int) -> None:
         """Move axis, supply and monitors on to ``t_ns``."""
-        self._run_cycles(t_ns)
+        self.catch_up(t_ns)
         self._look_at_switches()
         if self._booted:
             self.monitors.look(t_ns)
@@ -205,7 +212,8 @@ class OatPmc(Application):
         self._evaluate(t_ns)
         self.device.poll(t_ns)
 
-    def _run_cycles(self, t_ns: int) -> None:
+    def run_cycles(self, t_ns: int) -> None:
+        """Run the axis' cycles up to ``t_ns``; what happens in one of them counts in that cycle."""
         while (cycles := (t_ns - self._last_ns) // _CYCLE_NS) > 0:
             self._last_ns += self.drive.advance(cycles) * _CYCLE_NS
             if self._look_at_switches():
@@ -374,7 +382,7 @@ class OatPmc(Application):
     def _probe_changed(self) -> None:
         """The measuring input rose or fell: keep the position of the latest cycle (60BAh, 60BBh)."""
         if self._booted:
-            self._run_cycles(self.device.line.now_ns)
+            self.catch_up(self.device.line.now_ns)
             self._store.cell(0x60BA if self.inputs.probe else 0x60BB).raw = round(self.drive.position)
 
     # -- objects ---------------------------------------------------------------------------
@@ -415,6 +423,8 @@ class OatPmc(Application):
         store.cell(0x606A).guard = self._only_at_rest
         store.cell(0x60FF).effect = self._on_velocity
         store.cell(0x6510, 7).effect = self._on_mask
+        for index in _CYCLIC_SET_POINTS:
+            store.cell(index).guard = self._before_set_point
         for sub in (1, 2):
             store.cell(0x60C2, sub).guard = self._period_guard(sub)
         for index, sub in JUDGED:
@@ -424,6 +434,11 @@ class OatPmc(Application):
                 cell.effect = self._refresh
             elif cell.effect is None and cell.entry.address.major in _BLADE_SCALING_OBJECTS:
                 cell.effect = self._refresh_blade
+
+    def _before_set_point(self, _raw: Raw) -> None:
+        """A cyclic set-point counts from the cycle in which it comes, so those before it are run first."""
+        if self.drive.cyclic:
+            self.catch_up(self.device.line.now_ns)
 
     def _refresh(self, _raw: Raw) -> None:
         self.drive.refresh()

@@ -231,12 +231,18 @@ class AxisPlant:
     @property
     def slips(self) -> bool:
         """The load is more than friction and brake hold."""
-        return abs(self.load_nm) > self._motor_friction_nm + self._blade_friction_nm
+        return not self._holds(self.load_nm)
 
     @property
     def at_rest(self) -> bool:
         """Nothing moves, and nothing will by itself."""
-        return self.s[k.MOTOR_RAD_S] == 0.0 == self.s[k.BLADE_RAD_S] and not self.slips
+        return self._rests_under(self.load_nm)
+
+    def _rests_under(self, load_nm: float) -> bool:
+        return self.s[k.MOTOR_RAD_S] == 0.0 == self.s[k.BLADE_RAD_S] and self._holds(load_nm)
+
+    def _holds(self, load_nm: float) -> bool:
+        return abs(load_nm) <= self._motor_friction_nm + self._blade_friction_nm
 
     @property
     def load_nm(self) -> float:
@@ -264,10 +270,10 @@ class AxisPlant:
         """Run up to so many cycles; gives how many: it stops after one that brought an event (``events``)."""
         s, p = self.s, self.p
         s[k.EVENT] = 0.0
-        p[k.LOAD_NM] = self.load_nm
+        load_nm = p[k.LOAD_NM] = self.load_nm
         p[k.MOTOR_FRICTION_NM] = self._motor_friction_nm
         p[k.ENCODER_COUNTS] = 0.0 if self.encoder_fault is EncoderFault.SINE_COSINE else 1.0
-        p[k.AWAKE] = 0.0 if not p[k.ENERGISED] and self.at_rest and s[k.CURRENT_A] == 0.0 else 1.0
+        p[k.AWAKE] = 0.0 if not p[k.ENERGISED] and s[k.CURRENT_A] == 0.0 and self._rests_under(load_nm) else 1.0
         if not self.blade_encoder_failed:
             self._blade_encoder_held_deg = self.angle_deg + self.blade_encoder_slip_deg
         if not p[k.AWAKE]:

@@ -112,6 +112,7 @@ class Blade:
         if settings.unit_link:
             self.pmm.join(node)
             self.pmc.join(number)
+        self.pmc.catch_up = self._catch_up
         self._alarm = Alarm(line)
 
     @property
@@ -134,11 +135,15 @@ class Blade:
 
     def advance(self, t_ns: int) -> None:
         """Bring physics and units to ``t_ns``, as whoever is about to change the plant from outside must do."""
+        self.pmc.tick(t_ns)
+        self.pmm.tick(t_ns)
+
+    def _catch_up(self, t_ns: int) -> None:
+        """Physics alone."""
         self.power.brake_lifted = self.axis.brake_lifted
         self.power.prepare()
-        self.pmc.tick(t_ns)
+        self.pmc.run_cycles(t_ns)
         self.power.settle()
-        self.pmm.tick(t_ns)
 
     def _tick(self, t_ns: int) -> None:
         """The next one comes sooner while something moves that must be looked at often."""
