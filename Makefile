@@ -1,6 +1,7 @@
 # make run    the demo: twins, server and page      make test   everything that must pass
 # make check  the fast loop (format, lint, types, layers, generated files)
 # make bench  all benchmarks                        make soak   the long figures
+# make recordings  the scenarios of recordings/, simulated and recorded anew
 # make wheel  the package with the page inside      make screenshots   pictures of every room, for README and docs
 PYTHON ?= python3
 VENV   ?= .venv
@@ -8,7 +9,7 @@ BIN    := $(VENV)/bin
 PY     := $(BIN)/python
 ROOT   := $(if $(filter 0,$(shell id -u)),,sudo)
 
-.PHONY: run test check bench soak setup system page wheel screenshots lock generate clean
+.PHONY: run test check bench soak setup system page wheel recordings screenshots lock generate clean
 
 run: $(VENV)/.ready frontend/dist/index.html
 	$(BIN)/hubside demo
@@ -62,6 +63,10 @@ page: frontend/dist/index.html
 wheel: $(VENV)/.ready frontend/dist/index.html
 	rm -rf dist
 	$(PY) -m build --wheel --no-isolation --outdir dist .
+
+# Twins in bulk, as fast as the machine goes; the same scenarios make the same recordings.
+recordings: $(VENV)/.ready
+	$(BIN)/hubside twin record recordings/scenarios/*.toml
 
 screenshots: setup
 	$(PY) -m tests.e2e.screenshots

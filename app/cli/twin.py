@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from app.cli import twin_fault
+from app.cli import twin_fault, twin_record
 from app.cli.arguments import bitrate, milliseconds, seed, wind
 from app.cli.output import Output
 from app.cli.runtime import spare_collector
@@ -58,6 +58,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     )
     oat.set_defaults(run=run)
     twin_fault.add_parser(kinds)
+    twin_record.add_parser(kinds)
 
 
 def run(arguments: argparse.Namespace, output: Output) -> int:

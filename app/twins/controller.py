@@ -56,6 +56,8 @@ _MODE: Final = Address(0x6060)
 _MANUAL: Final = Address(0x5040)
 _MANUAL_RESET: Final = 0x80
 _STATE_MASK: Final = 0x6F
+_IDLE_BEATS: Final = 2
+"""The first one may have been on its way when the node was started."""
 _ANEW_CYCLES: Final = 10
 """So often an enable that has no effect is given anew."""
 _PULSE_NS: Final = 200 * _MS
@@ -89,6 +91,8 @@ class _Device:
     ready: bool = False
     """Set and started."""
     setting: bool = False
+    idle_beats: int = 0
+    """Heartbeats in a row that told another state than operational."""
     error: int = 0
     """Code of its last emergency message."""
 
@@ -167,8 +171,7 @@ class TurbineController:
     # -- for whoever runs it ---------------------------------------------------------
 
     def start(self, t_ns: int) -> None:
-        """Switched on at ``t_ns`` (line time)."""
-        self._rotor.generator_nm = 0.0
+        """Switched on at ``t_ns`` (line time). It takes the generator over when it begins to run."""
         self._close_contact(True)
         self._alarm.set(t_ns + SYNC_NS, self._cycle)
         self._heart.set(t_ns + HEARTBEAT_MS * _MS, self._beat)
@@ -247,7 +250,7 @@ class TurbineController:
             return
         if phase is Phase.RUNNING:
             known = [axis.position_deg for axis in self._axes.values() if axis.position_deg is not None]
-            self.law.start(sum(known) / len(known) if known else PARK_DEG)
+            self.law.start(sum(known) / len(known) if known else PARK_DEG, self._rotor.speed_rpm)
         else:
             self._rotor.generator_nm = 0.0
         self.phase = phase
@@ -284,6 +287,8 @@ class TurbineController:
         self._close_contact(True)
         for device in self._devices.values():
             device.error = 0
+            if device.idle_beats:  # somebody took it out of operation: set and started anew
+                device.ready, device.idle_beats = False, 0
         self._pulse(PMMS, _PMM_RESET)
         self._reset_alarm.set(self._line.now_ns + 2 * _PULSE_NS, self._reset_axes)
 
@@ -317,6 +322,8 @@ class TurbineController:
                 return f"node {device.node} is silent"
             if not device.ready:
                 return f"node {device.node} has restarted"
+            if device.idle_beats >= _IDLE_BEATS:
+                return f"node {device.node} is not operational"
             if device.error:
                 return f"node {device.node} tells error {device.error:04X}h"
         for axis in self._axes.values():
@@ -472,9 +479,11 @@ class TurbineController:
     def _on_heartbeat(self, device: _Device, data: bytes, t_ns: int) -> None:
         device.heard_ns = t_ns
         if data != nmt.heartbeat(NmtState.BOOT_UP):
+            idle = device.ready and data != nmt.heartbeat(NmtState.OPERATIONAL)
+            device.idle_beats = device.idle_beats + 1 if idle else 0
             return
         device.ready = device.setting = False
-        device.error = 0
+        device.error = device.idle_beats = 0
         self._sdo.drop(device.node)
         if device.node in self._axes:
             axis = self._axes[device.node]

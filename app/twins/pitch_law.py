@@ -51,10 +51,12 @@ class PitchLaw:
         self.generator_nm = 0.0
         self._integral_deg = 0.0
 
-    def start(self, pitch_deg: float) -> None:
-        """Begin at a pitch."""
-        self.pitch_deg = min(max(pitch_deg, self.constants.fine_deg), self.constants.feather_deg)
-        self._integral_deg = self.pitch_deg
+    def start(self, pitch_deg: float, rotor_rpm: float = 0.0) -> None:
+        """Begin at a pitch, without a bump where the rotor turns near its rated speed already."""
+        constants = self.constants
+        self.pitch_deg = min(max(pitch_deg, constants.fine_deg), constants.feather_deg)
+        bump_deg = constants.gain_deg_s * (rotor_rpm - constants.rated_rpm) / RPM
+        self._integral_deg = min(max(self.pitch_deg - bump_deg, constants.fine_deg), constants.feather_deg)
         self.generator_nm = 0.0
 
     def step(self, dt_s: float, rotor_rpm: float) -> None:

@@ -232,6 +232,18 @@ def test_a_device_that_loses_its_power_trips_it_and_is_set_anew_when_it_is_back(
     assert rig.stands(Phase.RUNNING)
 
 
+def test_a_device_that_somebody_takes_out_of_operation_trips_it_and_is_started_by_the_reset() -> None:
+    rig = Rig(angle_deg=8.0)
+    rig.run(3)
+    rig.master.nmt(NmtCommand.PRE_OPERATIONAL, 13)
+    rig.until(Phase.TRIPPED, 2)
+    assert rig.controller.trip_reason == "node 13 is not operational"
+    rig.controller.command({"reset": True})
+    rig.controller.command({"run": True})
+    rig.run(6)
+    assert rig.stands(Phase.RUNNING)
+
+
 def test_a_device_that_restarts_under_way_trips_it() -> None:
     rig = Rig(angle_deg=8.0)
     rig.run(3)
