@@ -326,3 +326,92 @@ def test_a_standstill_of_the_host_is_skipped() -> None:
         assert enough.wait(5)
     assert len(ticks) <= 2
     assert thread.skipped_ns >= 59_000_000_000
+
+
+def test_a_node_that_is_cut_off_neither_sends_nor_hears(line: CanLine) -> None:
+    a, b = Node(line), Node(line)
+    a.port.send(Can(0x100))
+    a.port.cut()
+    a.port.send(Can(0x101))
+    b.port.send(Can(0x200))
+    line.run_until(10_000_000)
+    assert (a.got, b.got, a.port.pending) == ([], [], 0)
+    a.port.cut()
+    a.port.join()
+    b.port.send(Can(0x201))
+    line.run_until(20_000_000)
+    assert a.got == [], "cuts add up"
+    a.port.join()
+    a.port.send(Can(0x102))
+    b.port.send(Can(0x202))
+    line.run_until(30_000_000)
+    assert (a.ids, b.ids) == ([0x202], [0x102])
+
+
+def test_a_frame_on_the_line_ends_normally_though_its_sender_is_cut_off(line: CanLine) -> None:
+    a, b = Node(line), Node(line)
+    a.port.send(Can(0x100, bytes(8)))
+    line.run_until(10_000)
+    a.port.cut()
+    line.run_until(10_000_000)
+    assert b.ids == [0x100]
+
+
+def test_a_node_that_is_cut_off_while_a_frame_is_handed_out_does_not_get_it(line: CanLine) -> None:
+    sender, last = Node(line), Node(line)
+    line.attach(lambda _can, _t_ns: None)
+    cutter = line.attach(lambda _can, _t_ns: later.port.cut())
+    later = Node(line)
+    sender.port.send(Can(0x100))
+    line.run_until(10_000_000)
+    assert cutter.live
+    assert last.ids == [0x100]
+    assert later.got == []
+
+
+def test_a_port_that_has_left_stays_away(line: CanLine) -> None:
+    a, b = Node(line), Node(line)
+    a.port.cut()
+    a.port.detach()
+    a.port.join()
+    a.port.put(Can(0x100))
+    b.port.send(Can(0x200))
+    line.run_until(10_000_000)
+    assert (a.got, b.got) == ([], [])
+
+
+def test_what_a_fault_puts_on_the_line_is_exempt_from_faults(line: CanLine) -> None:
+    a, listener = Node(line), Node(line)
+    line.inject(Fault(lambda can: can.can_id == 0x100, duplicate(2), None))
+    line.inject(Fault(lambda _can: True, drop, None))
+    a.port.send(Can(0x100))
+    a.port.send(Can(0x200))
+    line.run_until(10_000_000)
+    assert listener.ids == [0x100, 0x100]
+
+
+def test_a_fault_that_was_withdrawn_does_nothing_more(line: CanLine) -> None:
+    a, listener = Node(line), Node(line)
+    fault = Fault(lambda _can: True, drop, None)
+    line.inject(fault)
+    line.withdraw(fault)
+    line.withdraw(fault)
+    a.port.send(Can(0x100))
+    line.run_until(10_000_000)
+    assert listener.ids == [0x100]
+
+
+def test_a_tap_can_take_itself_away(line: CanLine) -> None:
+    seen: list[int] = []
+
+    def once(_start_ns: int, _end_ns: int, can: Can) -> None:
+        seen.append(can.can_id)
+        line.untap(once)
+
+    a = Node(line)
+    line.tap(once)
+    line.tap(lambda _start_ns, _end_ns, can: seen.append(-can.can_id))
+    a.port.send(Can(0x100))
+    a.port.send(Can(0x200))
+    line.run_until(10_000_000)
+    assert seen == [0x100, -0x100, -0x200]
