@@ -350,7 +350,9 @@ class OatPmc(Application):
         if self.drive.mode in (*_CYCLIC, Mode.HOMING):
             return True
         if self._controlword & Control.HALT and not self.machine.feathering:
-            return self.drive.at_rest
+            # In mode 3 the set-point decides, not the motor (5.11.1).
+            by_speed = self.drive.mode is Mode.PROFILE_VELOCITY
+            return self.drive.profile.velocity == 0 if by_speed else self.drive.at_rest
         return self._mode_is_new or self.drive.target_reached
 
     # -- inputs and outputs --------------------------------------------------------------
