@@ -189,6 +189,9 @@ def test_bit_10_stays_set_in_the_cyclic_modes(rig: BladeRig, mode: int) -> None:
         rig.master.run(20 * MS)
         assert rig.bit(REACHED)
     assert rig.get("606C") < -100
+    rig.command(ENABLE)
+    assert rig.bit(REACHED)
+    assert rig.get("606C") < -50  # under halt, and on its way yet
 
 
 # -- bits 12 and 13 -------------------------------------------------------------------------
