@@ -154,18 +154,17 @@ class CanopenDevice:
         self._silence()
         self.power = Power.OFF
         self.application.powered_off()
-        self.application.powered_off()
 
     def bus_off(self) -> None:
-        """The CAN controller takes itself off the bus (ISO 11898-1, 12.1.4); the device sees its connection lost."""
+        """The CAN controller takes itself off the bus (ISO 11898-1, 12.1.4); the device knows at once and reacts."""
         self.port.cut()
-        self.application.connection_lost(self.line.now_ns)
-
-    def bus_back(self) -> None:
-        """The CAN controller is back on the bus, and says so (CiA 301, table 26)."""
-        self.port.join()
         if self.power is Power.ON:
             self.application.communication_error(WAS_BUS_OFF)
+
+    def bus_back(self) -> None:
+        """The CAN controller is back on the bus, and now others hear of it (CiA 301, table 26)."""
+        self.port.join()
+        self.emergency.repeat(WAS_BUS_OFF)
 
     def poll(self, t_ns: int) -> None:
         """Let event-driven PDOs see what changed."""

@@ -63,6 +63,11 @@ class Emergency:
         self._history.appendleft((code | int.from_bytes(info[:2], "little") << 16, self._uptime_s()))
         self._transmit(code, info)
 
+    def repeat(self, code: int) -> None:
+        """Send the EMCY of a pending error once more: nobody could hear it before."""
+        if code in self._pending:
+            self._transmit(code, b"")
+
     def clear(self, code: int) -> None:
         """An error is gone; EMCY 0000h tells what is left (CiA 301, 7.2.7.1)."""
         if code in self._pending:

@@ -161,6 +161,44 @@ def test_a_lifted_brake_lets_the_blade_turn_under_load(rig: TurbineRig) -> None:
     assert rig.number(PMC, "6064", signed=True) < before - 500
 
 
+def drive(rig: TurbineRig, target: int) -> None:
+    """Blade 2 is on its way to ``target`` in 0.01 degrees."""
+    rig.master.put(PMC, "6060", 1, 1)
+    rig.master.put(PMC, "6081", 800, 4)
+    rig.master.put(PMC, "607A", target, 4)
+    for word in (0x010F, 0x000F, 0x001F, 0x000F):
+        rig.master.put(PMC, "6040", word, 2)
+    rig.run(1)
+    assert abs(rig.turbine.blades[1].axis.speed_rad_s) > 50
+
+
+@pytest.mark.rule("M9")
+@pytest.mark.parametrize(("option", "told"), [(0, False), (2, True), (3, True)])
+def test_an_axis_that_is_bus_off_does_what_6007_says(rig: TurbineRig, option: int, told: bool) -> None:
+    """It stops at once, or goes on until its PMM misses it; the safety chain then feathers all blades."""
+    rig.master.put(PMC, "6007", option, 2)
+    drive(rig, 2000)
+    axis = rig.turbine.blades[1].axis
+    was = axis.speed_rad_s
+    rig.fault("bus_off", node=PMC, seconds=2)
+    rig.run(0.2)
+    assert (abs(axis.speed_rad_s) < abs(was) / 3) is told
+    rig.run(2)
+    assert axis.speed_rad_s > 50, "to feather"
+    assert (0x8140 in rig.errors(PMC)) is told
+
+
+def test_an_axis_whose_power_is_cut_is_braked_and_goes_nowhere_after(rig: TurbineRig) -> None:
+    drive(rig, 2000)
+    axis = rig.turbine.blades[1].axis
+    rig.fault("power_cut", node=PMC, off_s=3)
+    rig.run(1.5)
+    assert axis.speed_rad_s == 0.0
+    stands_deg = axis.angle_deg
+    rig.run(1)
+    assert axis.angle_deg == pytest.approx(stands_deg, abs=0.1)
+
+
 # -- memory and supply ------------------------------------------------------------------
 
 
