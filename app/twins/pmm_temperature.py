@@ -80,7 +80,10 @@ class TemperatureWatch:
         return self._store.number(self._place.supervisor, sub)
 
     def _supervise(self, tenths_c: int | None) -> None:
-        """Table 32; "reached" is from the limit on, "undercut" below it. No hysteresis is printed, none is taken."""
+        """Table 32; "reached" is from the limit on, "undercut" below it.
+
+        OPEN whether supervisors have a hysteresis; none is printed, none is taken.
+        """
         low = tenths_c is not None and tenths_c < self._limit(3)
         warning = tenths_c is not None and tenths_c >= self._limit(1)
         error = tenths_c is not None and tenths_c >= self._limit(2)

@@ -38,7 +38,7 @@ def heat(rig: BladeRig, place: int, tenths_c: float) -> None:
     """Bring a measuring place to a temperature, and let the unit look."""
     power = rig.blade.power
     if place == 0:
-        power.thermal.box_c = tenths_c / 10
+        power.thermal.box_c = tenths_c / 10 - 2.0  # blocs are a little warmer than their air
         for bloc in power.blocs:
             bloc.temperature_c = tenths_c / 10
     elif place == 1:
@@ -193,13 +193,13 @@ def air_c(rig: BladeRig, place: int) -> float:
 def test_a_heater_heats_by_its_output(rig: BladeRig, get: Get, controller: str, status: str, place: int) -> None:
     """It warms the place until the temperature has risen by the hysteresis. Without an output nothing gets warm."""
     rig.blade.power.ambient_c = 2.0
-    heat(rig, place, 40)
-    rig.put(f"{controller}:03", 10, PMM)
+    heat(rig, place, 43)
+    rig.put(f"{controller}:03", 3, PMM)
     rig.put(f"{controller}:01", 45, PMM)
     rig.master.run(250 * MS)
     assert get(status) & HEATER
-    rig.master.until(lambda: not get(status) & HEATER, 3000 * SECOND, 2 * SECOND)
-    assert get(PLACES[place][2]) >= 55
+    rig.master.until(lambda: not get(status) & HEATER, 3000 * SECOND, SECOND)
+    assert get(PLACES[place][2]) >= 47
     rig.put(f"{controller}:04", 0, PMM)
     rig.put(f"{controller}:01", 300, PMM)
     rig.master.run(250 * MS)
@@ -214,13 +214,13 @@ def test_a_heater_heats_by_its_output(rig: BladeRig, get: Get, controller: str, 
 def test_a_cooler_cools_by_its_output(rig: BladeRig, get: Get, controller: str, status: str, place: int) -> None:
     rig.put(f"{controller}:05", 0x0100, PMM)
     rig.put(f"{controller}:06", 0x0200, PMM)
-    rig.put(f"{controller}:03", 5, PMM)
+    rig.put(f"{controller}:03", 3, PMM)
     rig.blade.power.ambient_c = 44.5
-    heat(rig, place, 455)
+    heat(rig, place, 452)
     rig.master.run(250 * MS)
     assert get(status) & COOLER
     rig.master.until(lambda: not get(status) & COOLER, 3000 * SECOND, 2 * SECOND)
-    assert get(PLACES[place][2]) <= 446
+    assert get(PLACES[place][2]) <= 448
 
 
 @pytest.mark.rule("H8")
