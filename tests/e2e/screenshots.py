@@ -10,7 +10,7 @@ import io
 import json
 import sys
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -34,7 +34,10 @@ THEMES: Final = ("dark", "light")
 
 @dataclass(frozen=True)
 class Shot:
-    """One picture: ``ready`` is a selector of what must be seen before it is taken; ``scene``: with the 3D view."""
+    """One picture: ``ready`` is a selector of what must be seen before it is taken; ``scene``: with the 3D view.
+
+    ``fault``: the order of a fault that acts while it is taken.
+    """
 
     name: str
     address: str
@@ -42,6 +45,7 @@ class Shot:
     language: str = "en"
     scene: bool = False
     themes: tuple[str, ...] = THEMES
+    fault: Mapping[str, object] | None = None
 
 
 SHOTS: Final = (
@@ -62,6 +66,14 @@ SHOTS: Final = (
     Shot("settings", "/settings", "[data-testid=adapters]"),
     Shot("settings-polling", "/settings?section=polling", "[data-testid=save-polling]"),
     Shot("settings-audit", "/settings?section=audit", "[data-testid=audit-rows]"),
+    # Last, for it leaves the twins with a fault.
+    Shot(
+        "instructor",
+        "/instructor?kind=overload&blade=3",
+        "[data-testid=fault-mains_failure]",
+        scene=True,
+        fault={"kind": "mains_failure", "blade": 2, "values": {"remaining_percent": 60}, "seconds": 300},
+    ),
 )
 
 
@@ -121,6 +133,9 @@ def picture(chromium: Browser, origin: str, cookies: list[dict[str, object]], sh
     )
     context.add_cookies(cookies)  # type: ignore[arg-type]
     try:
+        if shot.fault is not None:
+            context.request.delete(f"{origin}/api/instructor/faults")
+            context.request.post(f"{origin}/api/instructor/faults", data=dict(shot.fault))
         page = context.new_page()
         page.set_default_timeout(WAIT_MS)
         joint = "&" if "?" in shot.address else "?"

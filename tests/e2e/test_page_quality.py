@@ -38,8 +38,10 @@ PLACES = (
     "settings?section=users",
     "settings?section=audit",
     "settings?section=about",
+    "instructor",
+    "instructor?tab=scenarios",
 )
-ROOMS = ("Axis", "Parameters", "Sets", "Recordings", "Bus", "Procedures", "Settings", "Overview")
+ROOMS = ("Axis", "Parameters", "Sets", "Recordings", "Bus", "Procedures", "Settings", "Instructor", "Overview")
 
 
 @pytest.fixture(scope="module")
