@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from typing import Final
 
 from app.model.datatypes import Raw
@@ -14,6 +15,8 @@ _CYCLE_MS: Final = 1
 """The position controller's own cycle."""
 _INDICES: Final = range(-5, 1)
 """Exponents with which 1 to 255 can make at least that cycle, up to whole seconds."""
+_GAPS: Final = 5
+"""So many gaps between SYNCs are looked at: one that is late or lost makes no other cycle."""
 _SILENT_CYCLES: Final = 4
 """So many missing SYNCs mean that there are none any more."""
 
@@ -24,23 +27,25 @@ class CyclicPeriod:
     def __init__(self, store: ObjectStore) -> None:
         self._store = store
         self._sync_ns: int | None = None
-        self._sync_ms = 0
+        self._gaps_ms: deque[int] = deque(maxlen=_GAPS)
 
     def restart(self) -> None:
         """No SYNC was heard yet."""
-        self._sync_ns, self._sync_ms = None, 0
+        self._sync_ns = None
+        self._gaps_ms.clear()
 
     def synchronised(self, t_ns: int) -> None:
         """A SYNC came. Arbitration moves it by parts of a millisecond, cycles are whole ones."""
         if self._sync_ns is not None:
-            self._sync_ms = round((t_ns - self._sync_ns) / MS)
+            self._gaps_ms.append(round((t_ns - self._sync_ns) / MS))
         self._sync_ns = t_ns
 
     def sync_ms(self, now_ns: int) -> int:
-        """Cycle of the SYNC in ms; 0: there is none."""
-        if self._sync_ns is None or now_ns - self._sync_ns > self._sync_ms * _SILENT_CYCLES * MS:
+        """Cycle of the SYNC in ms, the median of its latest gaps; 0: there is none."""
+        if self._sync_ns is None or not self._gaps_ms:
             return 0
-        return self._sync_ms
+        cycle_ms = sorted(self._gaps_ms)[len(self._gaps_ms) // 2]
+        return 0 if now_ns - self._sync_ns > cycle_ms * _SILENT_CYCLES * MS else cycle_ms
 
     def fits(self, now_ns: int, value: int | None = None, index: int | None = None) -> bool:
         """Whether 60C2h (or what it would be) is a whole multiple of the internal cycle, and of the SYNC's."""

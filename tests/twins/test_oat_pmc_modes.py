@@ -458,6 +458,18 @@ def test_60c2_must_be_a_multiple_of_the_internal_cycle(rig: BladeRig) -> None:
 
 
 @pytest.mark.rule("K13")
+def test_a_sync_that_is_lost_or_late_makes_no_other_cycle(rig: BladeRig) -> None:
+    rig.put("60C2:01", 20)
+    for gap_ms in (20, 20, 20, 20, 20, 40, 23):
+        rig.master.send(0x80)
+        rig.master.run(gap_ms * MS)
+    rig.master.send(0x80)
+    rig.master.run(2 * MS)
+    rig.put("6060", 8)
+    assert rig.refused("60C2:01", 30) == INCOMPATIBLE
+
+
+@pytest.mark.rule("K13")
 def test_60c2_must_be_a_multiple_of_the_sync_cycle(rig: BladeRig) -> None:
     for _ in range(5):
         rig.master.send(0x80)
