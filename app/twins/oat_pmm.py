@@ -139,7 +139,9 @@ class OatPmm(Application):
 
         It opens too where the mains stays away for longer than 30E0h: the emergency mode begins.
         """
-        return self.running and not self.errors.pending and self._hold_up_ms > 0
+        if not self.running or self.errors.pending:
+            return False
+        return not self.supply.failed or self.supply.hold_up_ms > 0
 
     @property
     def lets_axis_run(self) -> bool:
@@ -150,13 +152,6 @@ class OatPmm(Application):
     def running(self) -> bool:
         """It is supplied and has booted."""
         return self._booted and self.device.power is not Power.OFF
-
-    @property
-    def _hold_up_ms(self) -> int:
-        """30B2h; a 30E0h of 0 bridges nothing, and harms nobody while the mains is there."""
-        if not self.supply.failed:
-            return max(1, self.supply.hold_up_ms)
-        return self.supply.hold_up_ms
 
     def _motor_tenths_c(self) -> int | None:
         """Motor temperature in 0.1 degrees, as the PMC says it."""

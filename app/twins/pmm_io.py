@@ -81,6 +81,8 @@ class PmmInputs:
 
         OPEN what X13.7 does, and what is "direct" about X13.8: each of the three executes the EFC as X13.10 does.
         """
+        if self._digital & CHAIN_INPUTS == CHAIN_INPUTS:
+            return False
         now_ns = self._now_ns()
         low = (bit for bit in _CHAIN_BITS if not self._digital >> bit & 1)
         return any(now_ns - self._fell_ns.get(bit, now_ns) >= EXECUTE_NS for bit in low)

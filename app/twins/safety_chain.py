@@ -44,8 +44,8 @@ class SafetyChain:
 
     def __init__(self, line: Line, blades: Sequence[Units]) -> None:
         self.closed = True
-        self._blades = tuple(blades)
-        self._levels = [True for _ in self._blades]
+        self._units = tuple((blade.pmm, blade.pmc) for blade in blades)
+        self._levels = [True for _ in self._units]
         self._alarm = Alarm(line)
 
     def start(self, t_ns: int) -> None:
@@ -60,19 +60,21 @@ class SafetyChain:
     def open_contacts(self) -> tuple[tuple[Contact, int], ...]:
         """What holds it open, with the node of the unit (0: the turbine)."""
         found = [] if self.closed else [(Contact.TURBINE, 0)]
-        for blade in self._blades:
-            if not blade.pmm.safety_relay:
-                found.append((Contact.PMM, blade.pmm.device.node_id))
-            if not blade.pmc.watchdog_closed:
-                found.append((Contact.PMC, blade.pmc.device.node_id))
+        for pmm, pmc in self._units:
+            if not pmm.safety_relay:
+                found.append((Contact.PMM, pmm.device.node_id))
+            if not pmc.watchdog_closed:
+                found.append((Contact.PMC, pmc.device.node_id))
         return tuple(found)
 
     def _tick(self, t_ns: int) -> None:
         self._alarm.set(t_ns + TICK_NS, self._tick)
-        closed = self.closed and all(b.pmm.safety_relay and b.pmc.watchdog_closed for b in self._blades)
-        for place, blade in enumerate(self._blades):
-            blade.pmm.inputs.chain(closed)
-            level = blade.pmm.lets_axis_run
+        closed = self.closed
+        for pmm, pmc in self._units:
+            closed = closed and pmm.safety_relay and pmc.watchdog_closed
+        for place, (pmm, pmc) in enumerate(self._units):
+            pmm.inputs.chain(closed)
+            level = pmm.lets_axis_run
             if level is not self._levels[place]:
                 self._levels[place] = level
-                blade.pmc.inputs.efc = level
+                pmc.inputs.efc = level
