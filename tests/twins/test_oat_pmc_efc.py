@@ -217,6 +217,18 @@ def test_with_a_dead_motor_encoder_it_goes_by_the_additional_one(rig: BladeRig, 
 
 
 @pytest.mark.rule("L4")
+def test_with_a_dead_blade_encoder_it_goes_by_that_of_the_motor_whatever_606a_says(rig: BladeRig) -> None:
+    rig.put("567A", 8800)
+    rig.put("606A", -1)
+    rig.blade.axis.blade_encoder_failed = True
+    rig.wait_state(State.FAULT)
+    assert rig.errors() == [0x7321]
+    rig.pmc.inputs.efc = False
+    rig.master.run(6 * SECOND)
+    assert rig.angle_deg == pytest.approx(88.0, abs=0.1)
+
+
+@pytest.mark.rule("L4")
 @pytest.mark.parametrize("simulated", [True, False])
 def test_with_no_encoder_left_it_goes_with_controlled_speed_to_the_switch(rig: BladeRig, simulated: bool) -> None:
     rig.put("5894", 0xFF if simulated else 0)
