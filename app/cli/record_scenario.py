@@ -156,7 +156,11 @@ def record_scenario(path: Path, out: Path, run: Run | None = None) -> Recorded:
     stage = _Stage(scenario, run_compiled() if run is None else run)
     with tempfile.TemporaryDirectory() as name:
         tape = _Tape(Path(name), scenario, source, stage)
-        _play(scenario, stage, tape)
+        try:
+            _play(scenario, stage, tape)
+        except BaseException as error:
+            tape.recorder.give_up(repr(error))
+            raise
         tape.recorder.shut()
         status = tape.recorder.status()
         if status.file is None or status.lost:
