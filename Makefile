@@ -9,7 +9,7 @@ BIN    := $(VENV)/bin
 PY     := $(BIN)/python
 ROOT   := $(if $(filter 0,$(shell id -u)),,sudo)
 
-.PHONY: run test check bench soak setup system page wheel recordings screenshots lock generate clean
+.PHONY: run test check bench soak setup system page wheel recordings screenshots plots lock generate clean
 
 run: $(VENV)/.ready frontend/dist/index.html
 	$(BIN)/hubside demo
@@ -71,11 +71,16 @@ recordings: $(VENV)/.ready
 screenshots: setup
 	$(PY) -m tests.e2e.screenshots
 
+# What docs/twins.md shows of a mains failure, drawn from the twins.
+plots: $(VENV)/.ready
+	$(PY) -m tests.twins.make_plots docs/img
+
 # Everything that is generated from something else; `make check` fails where it is out of date.
 generate: $(VENV)/.ready frontend/node_modules/.ready
 	$(PY) -m app.web.generate frontend/openapi.json
 	cd frontend && npm run --silent generate
 	$(BIN)/hubside od export --all-eds od/eds
+	$(PY) -m tests.twins.make_page docs/twins.md
 
 # Lock files hold versions and hashes and no registry host.
 lock:

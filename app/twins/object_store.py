@@ -204,8 +204,8 @@ class ObjectStore:
     def _link_mirrors(self) -> None:
         """Let 16-bit mirrors show, and write, the object they mirror.
 
-        The manual leaves open what a mirror shows where its object needs more bits. It is held at the limit of its
-        type: a cut-off number would pass as a true position.
+        OPEN what a mirror shows where its object needs more bits. It is held at the limit of its type: a cut-off
+        number would pass as a true position.
         """
         for cell in self._cells.values():
             mirror = cell.entry.mirror
