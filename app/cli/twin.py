@@ -80,7 +80,7 @@ def run(arguments: argparse.Namespace, output: Output) -> int:
     _begin(twins, arguments, stop.set)
     thread = LineThread(line)
     token = secrets.token_hex(TOKEN_BYTES)  # no leading dash
-    folder = arguments.scenarios or bundled_folder("recordings/scenarios", "scenarios")
+    folder = arguments.scenarios or bundled_folder("recordings/scenarios", "recordings/scenarios")
     control = ControlServer(thread, twins.instructor, token, folder)
     for problem in control.problems:
         output.say("cli.scenario_problem", reason=problem)
