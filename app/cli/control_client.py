@@ -9,8 +9,8 @@ import asyncio
 import contextlib
 import itertools
 import json
-from collections.abc import Sequence
-from typing import Any, Final
+from collections.abc import Callable, Sequence
+from typing import Any, Final, TypeVar
 
 from app.errors import TwinsGoneError, UsageError
 from app.model.address import is_decimal
@@ -27,6 +27,7 @@ from app.service.instructor import Playing, ScenarioRef, Situation
 ANSWER_S: Final = 5.0
 """Twins answer within a step of their line; after this long they are gone."""
 _LINE_MAX: Final = 1 << 20
+_Result = TypeVar("_Result")
 
 
 class ControlClient:
@@ -51,41 +52,39 @@ class ControlClient:
 
     async def catalogue(self) -> Sequence[FaultKind]:
         """All kinds of fault that they know. Raises TwinsGoneError."""
-        return [kind_from_table(table) for table in await self._ask("catalogue")]
+        return await self._ask("catalogue", lambda tables: [kind_from_table(table) for table in tables])
 
     async def situation(self) -> Situation:
         """What acts now. Raises TwinsGoneError."""
-        table = await self._ask("active")
-        playing = None if table["playing"] is None else Playing(**table["playing"])
-        return Situation(table["now_ns"], tuple(active_from_table(one) for one in table["faults"]), playing)
+        return await self._ask("active", _situation)
 
     async def inject(self, order: FaultOrder) -> ActiveFault:
         """Put a fault in. Raises UsageError that names the field, TwinsGoneError."""
-        return active_from_table(await self._ask("inject", order=order_table(order)))
+        return await self._ask("inject", active_from_table, order=order_table(order))
 
     async def clear(self, fault: int) -> None:
         """Take a fault out. Raises UsageError where there is no such fault, TwinsGoneError."""
-        await self._ask("clear", fault=fault)
+        await self._ask("clear", _nothing, fault=fault)
 
     async def clear_all(self) -> None:
         """Take all faults out. Raises TwinsGoneError."""
-        await self._ask("clear_all")
+        await self._ask("clear_all", _nothing)
 
     async def scenarios(self) -> Sequence[ScenarioRef]:
         """All scenarios that they can play by name. Raises TwinsGoneError."""
-        return [ScenarioRef(**table) for table in await self._ask("scenarios")]
+        return await self._ask("scenarios", lambda tables: [ScenarioRef(**table) for table in tables])
 
     async def play(self, scenario: str) -> None:
         """Begin a scenario by its name. Raises UsageError where there is none or it does not fit, TwinsGoneError."""
-        await self._ask("play", scenario=scenario)
+        await self._ask("play", _nothing, scenario=scenario)
 
     async def play_text(self, text: str, file: str) -> None:
         """Begin a scenario by its text; ``file`` names it. Raises as ``play``."""
-        await self._ask("play", text=text, file=file)
+        await self._ask("play", _nothing, text=text, file=file)
 
     async def stop(self) -> None:
         """End the scenario that plays. Raises TwinsGoneError."""
-        await self._ask("stop")
+        await self._ask("stop", _nothing)
 
     async def close(self) -> None:
         """End the connection."""
@@ -97,21 +96,21 @@ class ControlClient:
 
     # -- inside ------------------------------------------------------------------------
 
-    async def _ask(self, do: str, **needs: Any) -> Any:
+    async def _ask(self, do: str, read: Callable[[Any], _Result], **needs: Any) -> _Result:
+        """The result of a request, as ``read`` makes it. What makes no sense is as good as no answer."""
         async with self._lock:
             try:
                 answer = await asyncio.wait_for(self._exchange(do, needs), self._answer_s)
-            except (OSError, ValueError, KeyError, TypeError, EOFError, TimeoutError) as error:
+                if answer["ok"]:
+                    return read(answer["result"])
+                refusal = _refusal(answer["error"])
+            except (OSError, ValueError, KeyError, TypeError, AttributeError, EOFError, UsageError) as error:
                 await self.close()
                 raise TwinsGoneError(reason=_why(error)) from error
             except asyncio.CancelledError:  # an answer may still come, and would be taken for the next one's
                 await self.close()
                 raise
-        if answer["ok"]:
-            return answer["result"]
-        told = answer["error"]
-        field = {"field": told["field"]} if "field" in told else {}
-        raise UsageError(reason=told["text"], **field)
+        raise refusal
 
     async def _exchange(self, do: str, needs: dict[str, Any]) -> dict[str, Any]:
         if self._streams is None:
@@ -128,6 +127,20 @@ class ControlClient:
         if answer["id"] != number:
             raise ValueError("they answered another request")
         return answer
+
+
+def _situation(table: Any) -> Situation:
+    playing = None if table["playing"] is None else Playing(**table["playing"])
+    return Situation(int(table["now_ns"]), tuple(active_from_table(one) for one in table["faults"]), playing)
+
+
+def _nothing(_result: Any) -> None:
+    """Nothing is told but that it was done."""
+
+
+def _refusal(told: Any) -> UsageError:
+    field = {"field": str(told["field"])} if "field" in told else {}
+    return UsageError(reason=str(told["text"]), **field)
 
 
 def _why(error: Exception) -> str:
