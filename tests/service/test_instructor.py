@@ -12,6 +12,7 @@ import pytest
 from app.errors import FaultOrderError, FaultValueError, TwinsGoneError
 from app.model.fault import CATALOGUE, FaultOrder
 from app.model.site import load_site
+from app.model.texts import LANGUAGES, load_texts
 from app.service.bench import Bench
 from app.service.connection import Connection
 from app.service.instructor import InjectedLine, InstructorDesk, watched
@@ -22,6 +23,7 @@ from app.service.views import event_of_journal
 from app.twins.control_server import ControlServer
 from app.wire.frame import Stamper
 from tests.e2e.conftest import site_for
+from tests.e2e.processes import ROOT
 from tests.service.conftest import Served
 from tests.service.instructor_rig import DEADLINE_S, TOKEN, Control, controlled
 from tests.service.test_visits import describe, options
@@ -244,6 +246,14 @@ async def test_twins_that_are_gone_are_told_so_and_asked_until_they_are_back(
 
 async def test_the_catalogue_is_that_of_the_twins(desk: InstructorDesk) -> None:
     assert {kind.id: kind for kind in await desk.catalogue()} == CATALOGUE
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_every_scenario_that_comes_along_is_told_in_both_languages(language: str) -> None:
+    files = {path.stem for path in (ROOT / "recordings" / "scenarios").glob("*.toml")}
+    assert len(files) >= 8
+    told = {key for key in load_texts(language)._texts if key.startswith("scenario.")}
+    assert told == {f"scenario.{file}.{part}" for file in files for part in ("title", "about", "watch")}
 
 
 async def test_only_our_own_twins_have_an_instructor_and_they_are_twins_from_the_start(

@@ -16,9 +16,11 @@ export function InstructorMark() {
   if (faults.length === 0 && playing === null) return null;
   const count = faults.length;
   const names = [...new Set(faults.map(({ kind }) => t(`fault.${kind}.name`)))];
-  const title = playing === null ? [] : [t("page.instructor.plays", { title: playing.title })];
+  const own = `scenario.${playing?.scenario ?? ""}.title`;
+  const title = playing && (t.has(own) ? t(own) : playing.title);
+  const plays = title === null ? [] : [t("page.instructor.plays", { title })];
   return (
-    <Tooltip label={[...title, ...names].join("\n")} style={{ whiteSpace: "pre-line" }}>
+    <Tooltip label={[...plays, ...names].join("\n")} style={{ whiteSpace: "pre-line" }}>
       <Link to={INSTRUCTOR} search={roomSearch} className={classes.injected} data-testid="injected">
         {playing === null ? <IconBug size={19} aria-hidden /> : <IconPlayerPlay size={19} aria-hidden />}
         <span className={classes.injectedText}>
