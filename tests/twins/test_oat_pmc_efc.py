@@ -189,6 +189,20 @@ def test_it_is_driven_in_spite_of_another_error(rig: BladeRig, code: int) -> Non
 
 
 @pytest.mark.rule("L4")
+@pytest.mark.parametrize("code", [0x8611, 0x8130, 0x8620])
+def test_an_error_on_the_way_does_not_end_it(rig: BladeRig, code: int) -> None:
+    rig.put("6007", 3)
+    call(rig, by_input=True)
+    rig.run_until(lambda: rig.angle_deg > 82)
+    rig.pmc.raise_error(code)
+    assert rig.pmc.machine.feathering
+    rig.master.run(200 * MS)
+    assert rig.errors() == [code]
+    assert rig.get("606C") == pytest.approx(800, abs=10)
+    feathers(rig)
+
+
+@pytest.mark.rule("L4")
 @pytest.mark.parametrize("code", [0x2320, 0x3210, 0x6380])
 def test_it_is_not_driven_while_the_motor_cannot_run(rig: BladeRig, code: int) -> None:
     rig.pmc.errors.condition(code, True)
