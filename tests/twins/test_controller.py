@@ -300,6 +300,21 @@ def test_switched_off_it_is_silent_and_lets_go() -> None:
     assert rig.rotor.generator_nm is None
 
 
+def test_another_one_takes_over_on_twins_that_have_run_for_long() -> None:
+    rig = Rig(angle_deg=20.0)
+    rig.run(2)
+    rig.controller.stop()
+    rig.run(5)
+    following = TurbineController(rig.line, rig.rotor, contact=rig.contact.append)
+    following.start(rig.line.now_ns)
+    rig.run(3)
+    following.command({"reset": True})  # the axes miss the heartbeat of the first one, and its contact was open
+    following.command({"run": True})
+    rig.run(4)
+    assert following.phase is Phase.RUNNING
+    assert rig.contact[-1] is True
+
+
 @pytest.mark.parametrize(
     ("table", "field"),
     [
