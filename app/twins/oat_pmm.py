@@ -28,7 +28,6 @@ _KEEP_NS: Final = 60 * SECOND
 """How often remanent counters go to the file."""
 _ONLY_TYPE: Final = 0xA1
 """Battery type that the PMM supports (4.3.1.1)."""
-_LEAST_TEST_MIN: Final = 60
 _REMANENT: Final = (0x3050, 0x3051, 0x3052)
 _EEPROM_FAILED: Final = 0x5530
 LINK_BROKEN: Final = 0x3221
@@ -259,7 +258,6 @@ class OatPmm(Application):
 
     def _bind_commands(self) -> None:
         self._store.cell(0x3040).effect = self._on_controlword
-        self._store.cell(0x30E3).guard = _check_test_cycle
         self._store.cell(0x3020, 1).guard = _check_battery_type
 
     def _on_controlword(self, raw: Raw) -> None:
@@ -276,12 +274,6 @@ class OatPmm(Application):
             self.test.release(self._axis_moves())
         if (rising | falling) & PmmControl.BOOST:
             self.supply.boost(bool(rising & PmmControl.BOOST))
-
-
-def _check_test_cycle(raw: Raw) -> None:
-    """30E3h: 0, or 60 minutes and more. OPEN refused or raised; refused, so that nobody is mistaken about it."""
-    if isinstance(raw, int) and 0 < raw < _LEAST_TEST_MIN:
-        raise RefusedAccessError(Abort.VALUE_TOO_LOW)
 
 
 def _check_battery_type(raw: Raw) -> None:

@@ -81,6 +81,9 @@ class BatteryTest:
     def step(self, dt_s: float, axis_moves: bool) -> None:
         """Go on with a test, or begin one by the cycle of 30E3h (minutes; 0: never).
 
+        OPEN whether 1 to 59 minutes are refused or raised to 60; they are refused, by the limits of the object, so that
+        nobody is mistaken about what was set.
+
         One that is due and not possible waits, with bit 5, until the battery is charged and the motor rests.
         """
         self._since_s += dt_s
