@@ -15,6 +15,7 @@ import pytest
 from app.cli.main import build_parser
 from app.cli.output import Output
 from app.errors import HubsideError, TwinsGoneError, UsageError
+from app.model.bundled import bundled_folder
 from app.model.fault import CATALOGUE
 from app.model.texts import load_texts
 from app.twins.control_server import ControlServer
@@ -181,3 +182,17 @@ def test_twins_that_cannot_be_started_so_say_why(arguments: tuple[str, ...]) -> 
     ended = twins(*arguments)
     assert ended.returncode == 2, ended.stderr
     assert ended.stderr
+
+
+def test_all_scenarios_that_come_with_it_can_be_played_by_name() -> None:
+    rig = TurbineRig()
+    with LineThread(rig.line) as thread:
+        folder = bundled_folder("recordings/scenarios", "recordings/scenarios")
+        with ControlServer(thread, rig.instructor, TOKEN, folder) as server:
+            assert server.problems == []
+            reach = ("--control", server.address, "--token", TOKEN)
+            found = hubside("twin", "fault", "scenarios", *reach, "--json").json
+            assert len(found) >= 8
+            for scenario in found:
+                hubside("twin", "fault", "play", scenario["name"], *reach)
+                assert hubside("twin", "fault", "list", *reach, "--json").json["playing"]["title"] == scenario["title"]
