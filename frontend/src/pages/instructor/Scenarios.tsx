@@ -95,7 +95,7 @@ function Details({ scenario, line }: { scenario: Scenario; line: InstructorData 
               onClick={() => play.mutate(name)}
               data-testid="play"
             >
-              {t(line.playing === null ? "page.instructor.play" : "page.instructor.play_instead")}
+              {t(`page.instructor.${playWord(line, name)}`)}
             </Button>
           )}
         </NeedsRole>
@@ -106,6 +106,11 @@ function Details({ scenario, line }: { scenario: Scenario; line: InstructorData 
       )}
     </section>
   );
+}
+
+function playWord({ playing }: InstructorData, name: string): "play" | "play_instead" | "plays_now" {
+  if (playing === null) return "play";
+  return playing.scenario === name ? "plays_now" : "play_instead";
 }
 
 /** What to watch, in the language of the page where the catalogue has it; else what the file says. */
