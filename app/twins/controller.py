@@ -12,13 +12,13 @@ blades is the chain.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from enum import Enum
 from typing import Any, Final, NoReturn
 
 from app.errors import UsageError
 from app.model.address import Address
-from app.twins.cia402 import State, Status
+from app.twins.cia402 import State
+from app.twins.controller_devices import PARK_DEG, SeenDevice, SeenPmc, SeenPmm
 from app.twins.controller_plan import (
     HEARTBEAT_MS,
     PMC_POLLS,
@@ -39,8 +39,6 @@ from app.wire.nmt import NmtCommand, NmtState
 CONTROLLER_NODE: Final = 100
 PMMS: Final = (1, 2, 3)
 PMCS: Final = (11, 12, 13)
-PARK_DEG: Final = 85.0
-"""Where the blades stand when no power is made, clear of the 90 degree switch."""
 _MS: Final = 1_000_000
 _MISSING_NS: Final = 3 * HEARTBEAT_MS * _MS
 """A device that has not beaten for so long is missing."""
@@ -55,7 +53,6 @@ _SHUTDOWN, _SWITCH_ON, _ENABLE, _RUN, _DISABLE_VOLTAGE = 0x0106, 0x0107, 0x010F,
 _MODE: Final = Address(0x6060)
 _MANUAL: Final = Address(0x5040)
 _MANUAL_RESET: Final = 0x80
-_STATE_MASK: Final = 0x6F
 _IDLE_BEATS: Final = 2
 """The first one may have been on its way when the node was started."""
 _ANEW_CYCLES: Final = 10
@@ -82,62 +79,6 @@ class Phase(Enum):
 _MOVING: Final = (Phase.RUNNING, Phase.MANUAL, Phase.PARKING)
 
 
-@dataclass(slots=True)
-class _Device:
-    """A device as the controller sees it."""
-
-    node: int
-    heard_ns: int | None = None
-    ready: bool = False
-    """Set and started."""
-    setting: bool = False
-    idle_beats: int = 0
-    """Heartbeats in a row that told another state than operational."""
-    error: int = 0
-    """Code of its last emergency message."""
-
-
-@dataclass(slots=True)
-class _Unit(_Device):
-    """A PMM."""
-
-    status: int = 0
-    word: int = 0
-
-
-@dataclass(slots=True)
-class _Axis(_Device):
-    """A PMC."""
-
-    status: int | None = None
-    position_deg: float | None = None
-    set_deg: float = PARK_DEG
-    word: int = 0
-    waited: int = 0
-    """Cycles in "switched on"."""
-    mode_set: bool = False
-
-    @property
-    def state(self) -> int:
-        """Bits of the state; -1 where it is not known."""
-        return -1 if self.status is None else self.status & _STATE_MASK
-
-    @property
-    def failed(self) -> bool:
-        """Fault or its reaction: statusword bit 3."""
-        return self.status is not None and bool(self.status & State.FAULT.value)
-
-    @property
-    def remote(self) -> bool:
-        """The controlword counts."""
-        return self.status is not None and bool(self.status & Status.REMOTE)
-
-    @property
-    def enabled(self) -> bool:
-        """It follows."""
-        return self.state == State.OPERATION_ENABLED.value
-
-
 class TurbineController:
     """The controller on ``line``. ``start`` lets it work; ``command`` takes the orders of a scenario.
 
@@ -159,9 +100,9 @@ class TurbineController:
         self._wanted: Phase = Phase.RUNNING
         self._resetting = False
         self._angle_deg = PARK_DEG
-        self._units = {node: _Unit(node) for node in PMMS}
-        self._axes = {node: _Axis(node) for node in PMCS}
-        self._devices: dict[int, _Device] = {**self._units, **self._axes}
+        self._units = {node: SeenPmm(node) for node in PMMS}
+        self._axes = {node: SeenPmc(node) for node in PMCS}
+        self._devices: dict[int, SeenDevice] = {**self._units, **self._axes}
         self._port = line.attach(self._on_frame)
         self._port.accept(self._routes())
         self._sdo = SdoClient(line, self._port)
@@ -265,7 +206,7 @@ class TurbineController:
         for node in nodes:
             self._send_unit(self._units[node], 0)
 
-    def _send_unit(self, unit: _Unit, word: int) -> None:
+    def _send_unit(self, unit: SeenPmm, word: int) -> None:
         unit.word = word
         self._port.send(Can(pdo_id(1, unit.node, False), word.to_bytes(2, "little")))
 
@@ -308,7 +249,7 @@ class TurbineController:
         if self.phase is Phase.TRIPPED:
             self.phase = Phase.WAITING
 
-    def _heard_lately(self, device: _Device) -> bool:
+    def _heard_lately(self, device: SeenDevice) -> bool:
         return device.heard_ns is not None and self._line.now_ns - device.heard_ns <= _MISSING_NS
 
     def _close_contact(self, closed: bool) -> None:
@@ -374,14 +315,14 @@ class TurbineController:
             return PARK_DEG, _MANUAL_DPS
         return self._angle_deg, _MANUAL_DPS
 
-    def _follow(self, axis: _Axis, demand_deg: float, most_deg: float) -> None:
+    def _follow(self, axis: SeenPmc, demand_deg: float, most_deg: float) -> None:
         """Let the set-point go from where the blade is to where it shall be."""
         if not axis.enabled or axis.position_deg is None:
             axis.set_deg = PARK_DEG if axis.position_deg is None else axis.position_deg
         elif self.phase in _MOVING:
             axis.set_deg += min(max(demand_deg - axis.set_deg, -most_deg), most_deg)
 
-    def _word(self, axis: _Axis) -> int:
+    def _word(self, axis: SeenPmc) -> int:
         """The controlword that leads on from the state in which the axis is (tables 50 and 52)."""
         if self.phase not in _MOVING:
             return _SHUTDOWN
@@ -397,14 +338,14 @@ class TurbineController:
             return _RUN
         return _DISABLE_VOLTAGE if axis.state == State.QUICK_STOP_ACTIVE.value else _SHUTDOWN
 
-    def _set_mode(self, axis: _Axis) -> None:
+    def _set_mode(self, axis: SeenPmc) -> None:
         def done(answer: bytes | None) -> None:
             axis.mode_set = answer is not None
 
         if self._sdo.idle(axis.node):
             self._sdo.write(axis.node, _MODE, bytes((_CYCLIC_POSITION,)), done)
 
-    def _send_axis(self, axis: _Axis, word: int) -> None:
+    def _send_axis(self, axis: SeenPmc, word: int) -> None:
         axis.word = word
         target = round(axis.set_deg * _UNITS_PER_DEG)
         data = word.to_bytes(2, "little") + target.to_bytes(4, "little", signed=True)
@@ -416,7 +357,7 @@ class TurbineController:
 
     # -- SDO: settings and what no PDO carries -------------------------------------------------
 
-    def _set(self, device: _Device) -> None:
+    def _set(self, device: SeenDevice) -> None:
         """Write all settings, then start the node; once more after a while where one of them fails."""
         device.setting, device.ready = True, False
         waiting = settings(device.node, device.node in self._axes, CONTROLLER_NODE)
@@ -476,7 +417,7 @@ class TurbineController:
         elif base == pdo_id(1, 0, True):
             self._units[node].status = can.data[0] if can.data else 0
 
-    def _on_heartbeat(self, device: _Device, data: bytes, t_ns: int) -> None:
+    def _on_heartbeat(self, device: SeenDevice, data: bytes, t_ns: int) -> None:
         device.heard_ns = t_ns
         if data != nmt.heartbeat(NmtState.BOOT_UP):
             idle = device.ready and data != nmt.heartbeat(NmtState.OPERATIONAL)
@@ -491,7 +432,7 @@ class TurbineController:
             axis.mode_set = False
 
     @staticmethod
-    def _on_axis(axis: _Axis, base: int, data: bytes) -> None:
+    def _on_axis(axis: SeenPmc, base: int, data: bytes) -> None:
         if base == pdo_id(1, 0, True) and len(data) >= 2:
             axis.status = int.from_bytes(data[:2], "little")
         elif base == pdo_id(2, 0, True) and len(data) >= 4:

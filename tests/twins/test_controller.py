@@ -10,7 +10,8 @@ import pytest
 from app.errors import UsageError
 from app.model.address import Address, parse_address
 from app.model.description_file import load_builtin
-from app.twins.controller import CONTROLLER_NODE, PARK_DEG, PMCS, PMMS, Phase, TurbineController
+from app.twins.controller import CONTROLLER_NODE, PMCS, PMMS, Phase, TurbineController
+from app.twins.controller_devices import PARK_DEG
 from app.twins.line import CanLine
 from app.twins.pitch_law import PitchLaw
 from app.twins.rotor import RATED_RPM, Rotor
