@@ -24,6 +24,8 @@ from app.wire.sdo import Abort
 
 _SLOW_NS: Final = 100 * MS
 """Cycle of charger, temperatures and outputs."""
+_POLL_NS: Final = 20 * MS
+"""How often changed values are looked for that a PDO tells by itself."""
 _KEEP_NS: Final = 60 * SECOND
 """How often remanent counters go to the file."""
 _ONLY_TYPE: Final = 0xA1
@@ -71,7 +73,7 @@ class OatPmm(Application):
         self._booted = self._slept = False
         self._controlword = 0
         self.supply = PmmSupply(self._store, power, self.errors, lambda: self.test.loads)
-        self._slow_ns = self._keep_ns = 0
+        self._slow_ns = self._keep_ns = self._polled_ns = 0
         self._bind_values()
         bind_blocs(self._store, power)
         self._bind_commands()
@@ -92,7 +94,7 @@ class OatPmm(Application):
         self.test.clear()
         self._battery_alarms.clear()
         self.temperatures.clear()
-        self._slow_ns = self._keep_ns = t_ns
+        self._slow_ns = self._keep_ns = self._polled_ns = t_ns
 
     def booted(self, t_ns: int) -> None:
         """It works by itself from now on."""
@@ -195,7 +197,9 @@ class OatPmm(Application):
         if t_ns - self._keep_ns >= _KEEP_NS:
             self._keep_ns = t_ns
             self.device.memory.keep()
-        self.device.poll(t_ns)
+        if t_ns - self._polled_ns >= _POLL_NS:
+            self._polled_ns = t_ns
+            self.device.poll(t_ns)
 
     def _slow(self, t_ns: int) -> None:
         dt_s = (t_ns - self._slow_ns) / SECOND

@@ -77,7 +77,10 @@ class Cell:
         span = kind.range
         if span is None or self.size is None or not isinstance(value, int):
             return encode_raw(kind, value)
-        return min(max(value, span[0]), span[1]).to_bytes(self.size, "little", signed=kind.is_signed)
+        low, high = span
+        if value < low or value > high:
+            value = low if value < low else high
+        return value.to_bytes(self.size, "little", signed=kind.is_signed)
 
 
 def initial(entry: Entry, node_id: int) -> Raw:

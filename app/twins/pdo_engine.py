@@ -107,7 +107,7 @@ class _Tpdo:
 
     def _data(self) -> bytes:
         if self._mapping.slots is not None:
-            return b"".join(cell.to_bytes() for cell in self._cells)
+            return b"".join([cell.to_bytes() for cell in self._cells])
         return pdo.pack(self._mapping, {cell.entry.address: cell.to_bytes() for cell in self._cells})
 
 
@@ -127,23 +127,25 @@ class _Rpdo:
         self._mapping = pdo.Mapping(mapping_of(self.objects))
         self._latched = None
 
-    def take(self, data: bytes) -> None:
-        """Data came; used at once or kept for the next SYNC. A frame that is too short is not used (7.2.2.5.2).
+    def take(self, data: bytes) -> bool:
+        """Data came; used at once (True) or kept for the next SYNC. A frame that is too short is not used (7.2.2.5.2).
 
         CiA 301 has emergency 8210h for that; neither unit's list of errors does (3.2.1.2, table 6), so none is sent.
         """
         if not self._mapping.entries or len(data) < self._mapping.size:
-            return
+            return False
         if self.parameters.transmission_type <= _MAX_SYNC_TYPE:
             self._latched = data
-        else:
-            self._use(data)
+            return False
+        self._use(data)
+        return True
 
-    def synchronise(self) -> None:
-        """A SYNC came."""
+    def synchronise(self) -> bool:
+        """A SYNC came; True where something was kept for it."""
         data, self._latched = self._latched, None
         if data is not None:
             self._use(data)
+        return data is not None
 
     def _use(self, data: bytes) -> None:
         for address, value in pdo.unpack(self._mapping, data):
@@ -190,11 +192,11 @@ class PdoEngine:
 
     def synchronise(self, t_ns: int) -> None:
         """A SYNC came: what was received is used, then what is due is sent."""
-        for rpdo in self._listening:
-            rpdo.synchronise()
+        used = [rpdo.synchronise() for rpdo in self._listening]
         for tpdo in self._running:
             tpdo.synchronise()
-        self.poll(t_ns)
+        if any(used):
+            self.poll(t_ns)
 
     def identifiers(self) -> dict[int, OnRemote]:
         """Identifiers to be received, with what takes them."""
@@ -209,10 +211,9 @@ class PdoEngine:
     def _received(self, can: Can, t_ns: int) -> None:
         if can.remote:
             return
-        for rpdo in self._listening:
-            if rpdo.parameters.can_id == can.can_id:
-                rpdo.take(can.data)
-        self.poll(t_ns)
+        used = [rpdo.take(can.data) for rpdo in self._listening if rpdo.parameters.can_id == can.can_id]
+        if any(used):
+            self.poll(t_ns)
 
     def _asked(self, can: Can, _t_ns: int) -> None:
         if can.remote:

@@ -308,7 +308,7 @@ async def test_rotor_and_wind_are_told_where_a_twin_tells_them(server: Server, p
 
 
 async def test_past_events_are_told_however_fast_a_page_asks_again() -> None:
-    """Topics that are replaced before anything of them was told, and topics asked for while messages are on their way."""
+    """Topics replaced before anything of them was told, and topics asked for while messages are on their way."""
     async with running() as server:
         server.bench.journal.note(Kind.CONNECTED, None, bus="can0", adapter="x")
         hasty = Feed(server.bench)
