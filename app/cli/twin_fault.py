@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from app.cli.output import Output
 from app.errors import UsageError
-from app.model.fault import FaultKind, FaultOrder, active_table, kind_table, order_from_words
+from app.model.fault import CATALOGUE, FaultKind, FaultOrder, active_table, kind_table, order_from_words
 
 if TYPE_CHECKING:
     from app.cli.control_client import ControlClient
@@ -37,7 +37,8 @@ def add_parser(kinds: argparse._SubParsersAction[argparse.ArgumentParser]) -> No
         one.set_defaults(run=lambda arguments, output: _run(arguments, output, run))
         return one
 
-    action("kinds", _kinds, "all kinds of fault, with what can be said of them")
+    kinds_of = actions.add_parser("kinds", help="all kinds of fault, with what can be said of them")
+    kinds_of.set_defaults(run=_kinds)
     action("list", _list, "what acts now")
     put = action("set", _set, "put a fault in")
     put.add_argument("kind")
@@ -69,14 +70,18 @@ async def _with_twins(arguments: argparse.Namespace, output: Output, run: Run) -
     return 0
 
 
-async def _kinds(_arguments: argparse.Namespace, output: Output, client: ControlClient) -> None:
-    kinds = await client.catalogue()
+def _kinds(_arguments: argparse.Namespace, output: Output) -> int:
+    """What this version knows; no twins are asked."""
     if output.as_json:
-        output.result([kind_table(kind) for kind in kinds], "")
-        return
+        output.result([kind_table(kind) for kind in CATALOGUE.values()], "")
+        return 0
     texts = output.texts
     head = [texts(f"cli.fault_head.{name}") for name in ("kind", "name", "place", "values")]
-    output.table(head, [(kind.id, texts(f"fault.{kind.id}.name"), kind.target.value, _ranges(kind)) for kind in kinds])
+    output.table(
+        head,
+        [(kind.id, texts(f"fault.{kind.id}.name"), kind.target.value, _ranges(kind)) for kind in CATALOGUE.values()],
+    )
+    return 0
 
 
 def _ranges(kind: FaultKind) -> str:

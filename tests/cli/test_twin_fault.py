@@ -83,11 +83,11 @@ def test_it_speaks_german(fault: Command) -> None:
     assert fault("list", language="de").out.startswith("NR  NAME")
 
 
-def test_all_kinds_are_shown(fault: Command) -> None:
-    rows = fault("kinds").out.splitlines()
+def test_all_kinds_are_shown_without_twins() -> None:
+    rows = hubside("twin", "fault", "kinds").out.splitlines()
     assert len(rows) == 1 + len(CATALOGUE)
     assert "delay_ms=2000 (1..60000 ms)" in next(row for row in rows if row.startswith("late_sdo_ack"))
-    assert [one["id"] for one in fault("kinds", "--json").json] == list(CATALOGUE)
+    assert [one["id"] for one in hubside("twin", "fault", "kinds", "--json").json] == list(CATALOGUE)
 
 
 def test_scenarios_by_name_and_by_file(fault: Command, tmp_path: Path) -> None:
