@@ -12,6 +12,7 @@ from math import pi
 from typing import Final
 
 from app.twins import axis_kernel as k
+from app.twins.axis_limits import AxisLimits
 from app.twins.axis_profile import Profile, SetPoints, Target
 from app.twins.axis_scaling import Scaling, blade_scaling, interpolation_ms, motor_scaling
 from app.twins.axis_tuning import SIMULATION, tune
@@ -23,10 +24,6 @@ _REST_RAD_S: Final = 1.0
 """Below this the motor counts as standing (0.03 degrees/s of the blade)."""
 _SETTLED_RAD_S: Final = 0.05
 """Below this nothing is left to be controlled."""
-_CURRENT_LIMIT_SHARE: Final = 0.8
-"""Share of the current limit that a stop plans with, so that the controller can follow."""
-_LEAST_STOP_SHARE: Final = 0.1
-"""A stop is planned with at least this share of the rated torque, however low 6073h is."""
 _FEATHER_TO_SWITCH: Final = 1 << 8
 """60FBh/3: the 90 degree switch must be actuated in feather."""
 _FEATHER_BY_VELOCITY: Final = 1 << 9
@@ -68,7 +65,6 @@ class _Parameters:
 
     scaling: Scaling
     speed_limit_rad_s: float
-    peak_torque_nm: float
     position_time_s: float
     simulation: bool
 
@@ -93,6 +89,7 @@ class AxisDrive:
         self._feather_target: Target | None = None
         self._cyclic: Target | None = None
         self._cyclic_halted = False
+        self._limits = AxisLimits(store, plant.constants)
         self.blade = blade_scaling(store)
         self._now = self._read_parameters()
 
@@ -241,6 +238,7 @@ class AxisDrive:
     def refresh(self) -> None:
         """Take the parameters in force, after one was written."""
         before = self._now.scaling
+        self._limits.refresh()
         self._now = self._read_parameters()
         if self._now.scaling != before:
             self.profile.put(self._controlled_position)
@@ -259,7 +257,7 @@ class AxisDrive:
     def new_set_point(self) -> None:
         """Controlword bit 4 rose in mode 1: the target is limited and handed over."""
         if self._operating and self.mode is Mode.PROFILE_POSITION:
-            velocity, acceleration, deceleration = self._motion_limits()
+            velocity, acceleration, deceleration = self._limits.motion()
             position = self._limited_position(self._store.number(0x607A))
             self.targets.offer(Target(position, velocity, acceleration, deceleration))
             self.plant.s[k.WINDOW_S] = 0.0
@@ -297,7 +295,7 @@ class AxisDrive:
         if self.halted and self._operating:
             return self.at_rest
         if self.mode is Mode.PROFILE_VELOCITY:
-            return self.profile.velocity == self._velocity_target()
+            return self.profile.velocity == self._limits.velocity_target(cyclic=False)
         return self.targets.reached and self.targets.last
 
     # -- cycles --------------------------------------------------------------------------
@@ -333,17 +331,17 @@ class AxisDrive:
         if self._stop is Stop.QUICK:
             p[k.SET_KIND] = k.QUICK
         elif self._stop is not None or not self._operating:
-            self._hold_at(self._stopping_deceleration())
+            self._hold_at(self._limits.stopping())
         elif self.mode is Mode.PROFILE_POSITION:
             self._follow_target()
         elif self.mode is Mode.PROFILE_VELOCITY:
-            self._follow_velocity(self._stopping_deceleration())
+            self._follow_velocity(self._limits.stopping())
         elif self.mode is Mode.CYCLIC_POSITION:
             self._follow_position()
         elif self.mode is Mode.CYCLIC_VELOCITY:
-            self._follow_velocity(self._current_limit_deceleration())
+            self._follow_velocity(self._limits.current_limit)
         else:
-            self._hold_at(self._stopping_deceleration())
+            self._hold_at(self._limits.stopping())
             if self.mode is Mode.HEATING:
                 p[k.HEATING_A] = self._store.number(0x6410, 13) / 1000 * self.plant.constants.rated_current_a
 
@@ -375,7 +373,7 @@ class AxisDrive:
     def _follow_target(self) -> None:
         target = self.targets.active
         if self.halted or target is None:
-            self._hold_at(self._stopping_deceleration())
+            self._hold_at(self._limits.stopping())
             return
         self._go_to(target)
         self.plant.p[k.WATCHES_TARGET] = 0.0 if self.targets.reached else 1.0
@@ -388,7 +386,7 @@ class AxisDrive:
         OPEN minimal or maximal deceleration on halt; the maximal one, the axis stops sooner.
         """
         if self.halted:
-            self._hold_at(self._current_limit_deceleration())
+            self._hold_at(self._limits.current_limit)
             self._cyclic, self._cyclic_halted = None, True
             return
         position = self._limited_position(self._store.number(0x607A) + self._store.number(0x60B0))
@@ -396,7 +394,7 @@ class AxisDrive:
             self._cyclic_halted = False
             self.profile.put(position)
         if self._cyclic is None or self._cyclic.position != position:
-            velocity, acceleration, deceleration = self._motion_limits()
+            velocity, acceleration, deceleration = self._limits.motion()
             before, self._cyclic = self._cyclic, Target(position, velocity, acceleration, deceleration)
             self._approach(self._cyclic, 0.0 if before is None else position - before.position)
         self.plant.p[k.EXTRA_VELOCITY] = self._store.number(0x60B1)
@@ -421,11 +419,11 @@ class AxisDrive:
             self._hold_at(stopping)
             self._cyclic_halted = self.mode is Mode.CYCLIC_VELOCITY
             return
-        _limit, acceleration, deceleration = self._motion_limits()
+        _limit, acceleration, deceleration = self._limits.motion()
         if self._cyclic_halted:  # mode 9: back to its velocity without a ramp
             self._cyclic_halted = False
-            self.profile.put(self.profile.position, self._velocity_target())
-        self._run_at(self._velocity_target(), acceleration, deceleration)
+            self.profile.put(self.profile.position, self._limits.velocity_target(self.mode is Mode.CYCLIC_VELOCITY))
+        self._run_at(self._limits.velocity_target(self.mode is Mode.CYCLIC_VELOCITY), acceleration, deceleration)
 
     def _run_at(self, velocity: float, acceleration: float, deceleration: float) -> None:
         p = self.plant.p
@@ -440,7 +438,7 @@ class AxisDrive:
         if self.mode is Mode.PROFILE_POSITION:
             return not self.targets.reached and not self.halted
         if self.mode is Mode.PROFILE_VELOCITY:
-            return not self.halted and self._velocity_target() != 0
+            return not self.halted and self._limits.velocity_target(cyclic=False) != 0
         return self.mode in (Mode.CYCLIC_POSITION, Mode.CYCLIC_VELOCITY)
 
     def _hold(self) -> None:
@@ -470,9 +468,9 @@ class AxisDrive:
             if not value and fallback is not None:
                 value = store.number(fallback)
             store.cell(target).raw = value
-        velocity, acceleration, deceleration = self._motion_limits()
+        velocity, acceleration, deceleration = self._limits.motion()
         if not velocity or not acceleration:
-            acceleration = self._current_limit_deceleration()
+            acceleration = self._limits.current_limit
             velocity = velocity or self._now.speed_limit_rad_s * abs(self.scaling.units_per_rad)
         self._feather_target = Target(
             self._limited_position(store.number(0x607A)), velocity, acceleration, deceleration
@@ -493,41 +491,6 @@ class AxisDrive:
         if target is not None:
             self.targets.force(replace(target, position=float(self._store.number(0x607D, 2))))
 
-    def _motion_limits(self) -> tuple[float, float, float]:
-        """Velocity, acceleration and deceleration in force, each within its maximum (607Fh, 60C5h, 60C6h).
-
-        A velocity or acceleration of 0 (their default) means no motion. OPEN what a maximum deceleration of 0 (its
-        default) means; no limit, for an axis must be able to stop.
-        """
-        store = self._store
-        velocity = min(store.number(0x6081), store.number(0x607F))
-        acceleration = min(store.number(0x6083), store.number(0x60C5))
-        return velocity, acceleration, self._stopping_deceleration()
-
-    def _stopping_deceleration(self) -> float:
-        store = self._store
-        deceleration = store.number(0x6084) or store.number(0x6083)
-        highest = store.number(0x60C6)
-        if highest:
-            deceleration = min(deceleration, highest)
-        return deceleration or self._current_limit_deceleration()
-
-    def _current_limit_deceleration(self) -> float:
-        constants = self.plant.constants
-        torque_nm = max(self._now.peak_torque_nm, constants.rated_torque_nm * _LEAST_STOP_SHARE)
-        rate = torque_nm * _CURRENT_LIMIT_SHARE / constants.inertia_kgm2
-        return rate * abs(self.scaling.units_per_rad)
-
-    def _velocity_target(self) -> float:
-        """60FFh within +-607Fh; in mode 9 with 60B1h, and within +-6081h where that is given."""
-        store = self._store
-        wanted = store.number(0x60FF)
-        limit = store.number(0x607F)
-        if self.mode is Mode.CYCLIC_VELOCITY:
-            wanted += store.number(0x60B1)
-            limit = min(limit, store.number(0x6081) or limit)
-        return min(max(wanted, -limit), limit)
-
     def _limited_position(self, wanted: int) -> float:
         store = self._store
         position = min(max(wanted, store.number(0x607D, 1)), store.number(0x607D, 2))
@@ -540,7 +503,6 @@ class AxisDrive:
         return _Parameters(
             scaling=motor_scaling(store),
             speed_limit_rad_s=store.number(0x6080) * 2 * pi / 60,
-            peak_torque_nm=min(store.number(0x6073), 2000) / 1000 * self.plant.constants.rated_torque_nm,
             position_time_s=store.number(0x6068) / 1000,
             simulation=bool(store.number(0x60FB, 3) & SIMULATION),
         )
