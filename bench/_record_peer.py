@@ -15,7 +15,7 @@ import can.logger
 
 from bench._meter import start_meter
 
-AGAIN_S = 5.0
+AGAIN_S = 15.0
 
 
 def _interrupt() -> None:
