@@ -89,7 +89,7 @@ function CommandDialog({ name, tone, run, warning, onClose }: CommandProps) {
         )}
         {command.isError && <ProblemAlert error={command.error} title={t(key("failed"), { device })} />}
         <Group justify="flex-end">
-          <Button variant="default" onClick={onClose} data-autofocus>
+          <Button variant="default" onClick={onClose} data-autofocus data-testid={`${name}-close`}>
             {t(command.isSuccess ? "page.close" : "page.cancel")}
           </Button>
           {!command.isSuccess && (
