@@ -244,6 +244,9 @@ def motor_and_gear(s: list[float], p: list[float], voltage: float) -> None:
     before = s[CURRENT_A]
     final = (voltage - s[MOTOR_RAD_S] * p[TORQUE_NM_PER_A] / 1.5) / p[RESISTANCE_OHM]
     after = final + (before - final) * p[DECAY]
+    # The output stage itself stops a current that grows beyond what it may give, however the controller is tuned.
+    if abs(after) > p[PEAK_A] and abs(after) > abs(before):
+        after = copysign(max(p[PEAK_A], abs(before)), after)
     mean = (before + after) / 2
     s[CURRENT_A] = after
     work = mechanics(s, p, mean * p[TORQUE_NM_PER_A])

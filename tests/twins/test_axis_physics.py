@@ -323,3 +323,13 @@ def test_heating_makes_losses_and_no_motion() -> None:
     assert s[k.MOTOR_J] == pytest.approx(s[k.COPPER_J] + s[k.INVERTER_J], rel=0.01)
     assert rig.plant.angle_deg == pytest.approx(50.0, abs=0.01)
     assert rig.drive.current_permille == 400
+
+
+def test_a_current_loop_tuned_beyond_reason_does_not_pass_the_current_limit() -> None:
+    rig = AxisRig(x60F6_01=65534, x60F6_02=65534, x6073=1200, x6081=800, x6065=-1 & 0xFFFFFFFF)
+    rig.start(Mode.PROFILE_POSITION)
+    rig.go(1000)
+    currents: list[float] = []
+    rig.run(0.5, lambda: currents.append(abs(rig.plant.s[k.CURRENT_A])))
+    assert max(currents) <= 1.2 * rig.plant.constants.rated_current_a + 1e-9
+    assert max(currents) > 1.1 * rig.plant.constants.rated_current_a

@@ -168,8 +168,9 @@ class BladeUnderAnything(RuleBasedStateMachine):
     @rule(write=writes())
     def parameter(self, write: tuple[int, str, int]) -> None:
         node, where, number = write
-        if self.put(node, where, number) and int(where[:4], 16) in SCALING:
+        if int(where[:4], 16) in SCALING:  # it acts before its acknowledge is heard
             self.witness.scaling_as_fitted = False
+        self.put(node, where, number)
 
     @rule(node=nodes, command=st.sampled_from((NmtCommand.START, NmtCommand.START, *NmtCommand)))
     def nmt(self, command: NmtCommand, node: int) -> None:

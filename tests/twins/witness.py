@@ -210,7 +210,7 @@ class Witness:
         units = abs(store(0x606C))
         per_rpm = abs(self.rig.pmc.drive.scaling.units_per_rad) / 9.549
         allowed = max(store(0x607F), self._fastest) + store(0x60FB, 1) * abs(store(0x60F4)) + _SPEED_RPM * per_rpm
-        if pushes and not self._machine.feathering:
+        if pushes and not self._machine.feathering and self.scaling_as_fitted:
             assert units <= allowed * _SPEED_SHARE, f"607Fh: {units} above {allowed}"
         self._fastest = min(self._fastest, units)
 
