@@ -62,8 +62,6 @@ FRICTION_J = 33
 LOAD_J = 34
 """Work that the load has done on the blade."""
 MESH_J = 35
-COPPER_W = 36
-"""Heat of the windings in the latest cycle."""
 
 # -- events: s[EVENT] is their sum -------------------------------------------------------------
 SWITCH_EVENT = 1.0
@@ -255,7 +253,6 @@ def motor_and_gear(s: list[float], p: list[float], voltage: float) -> None:
     magnetic = 0.75 * p[INDUCTANCE_H] * (after * after - before * before)
     taken = work + copper + stage + magnetic
     s[COPPER_J] += copper
-    s[COPPER_W] = copper / CYCLE_S
     s[INVERTER_J] += stage
     s[MOTOR_J] += taken
     s[MOTOR_DC_W] = taken / CYCLE_S
@@ -273,7 +270,7 @@ def coast(s: list[float], p: list[float]) -> None:
     """One cycle with the output stage off: what was in the windings becomes heat."""
     s[COPPER_J] += 0.75 * p[INDUCTANCE_H] * s[CURRENT_A] * s[CURRENT_A]
     s[CURRENT_A] = s[VELOCITY_I_A] = s[CURRENT_I_V] = s[CURRENT_WANTED_A] = 0.0
-    s[MOTOR_DC_W] = s[COPPER_W] = 0.0
+    s[MOTOR_DC_W] = 0.0
     s[PEAK_S] = max(0.0, s[PEAK_S] - CYCLE_S)
     if s[PEAK_S] == 0.0:
         s[PEAK_SPENT] = 0.0

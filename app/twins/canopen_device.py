@@ -82,9 +82,6 @@ class Application:
     def powered_off(self) -> None:
         """The supply is gone; all that it drives falls off, at once."""
 
-    def connection_lost(self, t_ns: int) -> None:
-        """A watched heartbeat failed; the error itself is raised by ``communication_error``."""
-
     def communication_error(self, code: int) -> None:
         """Raise a communication error with the code of an emergency message."""
 
@@ -299,7 +296,6 @@ class CanopenDevice:
 
     def _heartbeat_lost(self, _node: int) -> None:
         self.application.communication_error(HEARTBEAT_LOST)
-        self.application.connection_lost(self.line.now_ns)
 
     def _answer(self, data: bytes, t_ns: int) -> None:
         late_ns = self._mount.turnaround_ns + self._sdo.late_ns

@@ -181,16 +181,6 @@ class AxisPlant:
         return self.s[k.CURRENT_A] * self.constants.torque_nm_per_a
 
     @property
-    def power_w(self) -> float:
-        """What the output stage takes from the DC link; negative: it feeds back."""
-        return self.s[k.MOTOR_DC_W]
-
-    @property
-    def copper_w(self) -> float:
-        """Heat in the windings."""
-        return self.s[k.COPPER_W]
-
-    @property
     def at_0(self) -> bool:
         """The 0 degree switch is actuated."""
         return self.s[k.AT_0] != 0.0
@@ -227,11 +217,6 @@ class AxisPlant:
         """What the blade encoder counts at a blade angle of 0, slipped as it is."""
         turns = (self.blade_encoder_slip_deg - self._blade_encoder_zero_deg) / 360
         return turns * BLADE_ENCODER_GEAR * ENCODER_INCREMENTS
-
-    @property
-    def slips(self) -> bool:
-        """The load is more than friction and brake hold."""
-        return not self._holds(self.load_nm)
 
     @property
     def at_rest(self) -> bool:
@@ -277,7 +262,7 @@ class AxisPlant:
         if not self.blade_encoder_failed:
             self._blade_encoder_held_deg = self.angle_deg + self.blade_encoder_slip_deg
         if not p[k.AWAKE]:
-            s[k.MOTOR_DC_W] = s[k.COPPER_W] = 0.0
+            s[k.MOTOR_DC_W] = 0.0
         return self.run(s, p, cycles)
 
     @property
