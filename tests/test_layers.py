@@ -44,6 +44,8 @@ ONLY_IN: dict[str, tuple[str, ...]] = {
     "fastapi": ("web/",),
     "uvicorn": ("web/", "cli/", "cli.py"),
     "sqlalchemy": ("store/",),
+    "cryptography": ("service/",),
+    "typst": ("service/",),
 }
 """Libraries that only the named rooms may import."""
 
