@@ -83,8 +83,8 @@ class Need(Enum):
 class Plan:
     """A restore of one station.
 
-    ``findings`` are those of the rules for the station as it will be; ``blockers`` those of them that forbid the restore,
-    and ``unordered`` the places for which no order of writes keeps all stepwise rules.
+    ``findings``: what the rules say of the station as it will be; ``blockers``: those of them that forbid the restore;
+    ``unordered``: places for which no order of writes keeps all stepwise rules.
     """
 
     station: str
