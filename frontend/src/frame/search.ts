@@ -70,6 +70,17 @@ export interface PageSearch {
   paused?: string;
   /** Time stamp of the frame that is shown, in ns. */
   frame?: string;
+  /** What is compared, separated by commas ("live:wtg-07/blade-1/pmc,set:0199…"), and which rows are shown of it. */
+  columns?: string;
+  rows?: string;
+  group?: string;
+  /** The golden set of the fleet, the station that is restored, and the sets that are restored there. */
+  golden?: string;
+  station?: string;
+  sets?: string;
+  motor?: string;
+  /** The restore that is open. */
+  restore?: string;
 }
 
 const TEXTS = [
@@ -106,6 +117,14 @@ const TEXTS = [
   "errors",
   "paused",
   "frame",
+  "columns",
+  "rows",
+  "group",
+  "golden",
+  "station",
+  "sets",
+  "motor",
+  "restore",
 ] as const;
 
 /**

@@ -1,5 +1,5 @@
 /** The values of a set beside those of the device now. */
-import type { Raw } from "../../api/types";
+import type { Raw } from "../../../api/types";
 
 export interface SetRow {
   address: string;

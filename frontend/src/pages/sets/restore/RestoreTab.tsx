@@ -1,0 +1,14 @@
+import { useTexts } from "../../../texts/texts";
+import room from "../../../ui/Room.module.css";
+
+export function RestoreTab() {
+  const t = useTexts();
+  return (
+    <div className={room.room}>
+      <div className={room.strip}>
+        <h1>{t("page.sets.tab.restore")}</h1>
+      </div>
+      <p className={room.note}>{t("page.sets.empty.restore")}</p>
+    </div>
+  );
+}
