@@ -1,0 +1,118 @@
+"""How a rule reads a station: it asks for the objects that it needs, and what is not known makes it "not checked"."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Final
+
+from app.model.address import parse_address
+from app.model.rules.rule import Detail, Finding, Rule, Severity, Verdict
+from app.model.station import Place, StationValues
+
+PMM: Final = "oat-pmm"
+PMC: Final = "oat-pmc"
+
+
+@dataclass(frozen=True, slots=True)
+class Object:
+    """An object of a kind of device, wherever one is fitted."""
+
+    description_id: str
+    address: str
+
+
+def pmm(*addresses: str) -> tuple[Object, ...]:
+    """Objects of the PMM."""
+    return tuple(Object(PMM, one) for one in addresses)
+
+
+def pmc(*addresses: str) -> tuple[Object, ...]:
+    """Objects of the PMC."""
+    return tuple(Object(PMC, one) for one in addresses)
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """One thing that is wrong: the objects to mark and what fills the text's placeholders."""
+
+    objects: tuple[Object, ...]
+    details: Mapping[str, Detail] = field(default_factory=dict)
+
+
+class Look:
+    """Numbers of one station. What was asked for and is not known is kept in ``missing``."""
+
+    def __init__(self, station: StationValues) -> None:
+        self._station = station
+        self.missing: dict[Object, None] = {}
+
+    def __call__(self, *objects: Object) -> tuple[int, ...]:
+        """The raw values, in this order. Raises NotKnownError where any is missing; all of these are noted."""
+        found = [self.maybe(one) for one in objects]
+        known = tuple(raw for raw in found if raw is not None)
+        if len(known) < len(objects):
+            raise NotKnownError
+        return known
+
+    def maybe(self, one: Object) -> int | None:
+        """The raw value, or None; then it is noted as missing."""
+        device = self._station.of_kind(one.description_id)
+        raw = None if device is None else device.number(parse_address(one.address))
+        if raw is None:
+            self.missing[one] = None
+        return raw
+
+    def place(self, one: Object) -> Place | None:
+        """Where the object stands, None where no such device is there."""
+        device = self._station.of_kind(one.description_id)
+        return None if device is None else Place(device.slug, parse_address(one.address))
+
+    def places(self, objects: Iterable[Object]) -> tuple[Place, ...]:
+        """Where the objects stand, of those devices that are there."""
+        return tuple(place for place in map(self.place, objects) if place is not None)
+
+    def told(self, one: Object) -> str:
+        """A missing object in words: its address, or its device where that is not there at all."""
+        if self._station.of_kind(one.description_id) is None:
+            return one.description_id.replace("-", " ").upper()
+        return parse_address(one.address).short
+
+
+class NotKnownError(Exception):
+    """Ends a judgement for want of a value. It never leaves this package."""
+
+
+Judge = Callable[[Look], Iterator[Found]]
+
+
+def make_rule(
+    rule_id: str,
+    section: str,
+    severity: Severity,
+    objects: tuple[Object, ...],
+    judge: Judge,
+    *,
+    stepwise: bool = False,
+) -> Rule:
+    """A rule that judges by ``judge``; ``objects`` are all that it may look at."""
+    by_kind: dict[str, tuple[str, ...]] = {}
+    for one in objects:
+        by_kind[one.description_id] = (*by_kind.get(one.description_id, ()), one.address)
+
+    def check(station: StationValues) -> tuple[Finding, ...]:
+        return tuple(_findings(station, rule_id, severity, judge))
+
+    return Rule(rule_id, section, severity, stepwise, by_kind, check)
+
+
+def _findings(station: StationValues, rule_id: str, severity: Severity, judge: Judge) -> Iterator[Finding]:
+    look = Look(station)
+    try:
+        for found in judge(look):
+            yield Finding(rule_id, severity, Verdict.BROKEN, look.places(found.objects), found.details)
+    except NotKnownError:
+        pass  # what is missing was noted, and is told below
+    if look.missing:
+        names = ", ".join(dict.fromkeys(look.told(one) for one in look.missing))
+        yield Finding(rule_id, severity, Verdict.NOT_CHECKED, look.places(look.missing), {"missing": names})

@@ -1,0 +1,54 @@
+"""Rules over a station: what is broken, what is not checked, and what no step of a restore may break."""
+
+from __future__ import annotations
+
+from app.model.rules.check import broken_stepwise, check_station
+from app.model.rules.dc_link import RULES
+from app.model.rules.look import PMC, PMM
+from app.model.rules.rule import Severity, Verdict
+from app.model.station import StationValues
+from tests.model.rules.stations import device, place, station
+
+
+def test_the_ladder_holds_as_delivered() -> None:
+    assert check_station(station(), RULES) == []
+    assert broken_stepwise(station()) == frozenset()
+
+
+def test_a_broken_rung_names_both_places_over_both_devices() -> None:
+    (found,) = check_station(station(pmc={"6510:04": 400}), RULES)
+    assert (found.verdict, found.severity) == (Verdict.BROKEN, Severity.ERROR)
+    assert found.places == (place(PMC, "6510:04"), place(PMM, "30FA:03"))
+    assert found.details == {"lower": "6510:04", "upper": "30FA:03", "lower_v": 400, "upper_v": 400}
+    assert broken_stepwise(station(pmc={"6510:04": 400})) == {("oat.dc_link_ladder", found.places)}
+
+
+def test_the_maxima_may_be_equal_but_not_the_wrong_way_round() -> None:
+    assert check_station(station(pmc={"6510:05": 750}), RULES) == []
+    assert [one.places for one in check_station(station(pmc={"6510:05": 749}), RULES)] == [
+        (place(PMM, "30FA:02"), place(PMC, "6510:05"))
+    ]
+
+
+def test_without_its_partner_a_rule_is_not_checked_and_what_can_be_judged_is() -> None:
+    alone = StationValues((device(PMM, {"30FB:08": 390}),))
+    broken, unchecked = check_station(alone, RULES)
+    assert broken.places == (place(PMM, "30FA:03"), place(PMM, "30FB:08"))
+    assert (unchecked.verdict, unchecked.places) == (Verdict.NOT_CHECKED, ())
+    assert unchecked.details == {"missing": "OAT PMC"}
+
+
+def test_an_unknown_value_is_named_and_its_neighbours_are_compared() -> None:
+    broken, unchecked = check_station(station(pmm={"30FA:01": None, "30FB:08": 600}), RULES)
+    assert broken.places == (place(PMM, "30FB:08"), place(PMM, "30FB:07"))
+    assert (unchecked.places, unchecked.details) == ((place(PMM, "30FA:01"),), {"missing": "30FA:01"})
+
+
+def test_of_two_partners_none_is_taken() -> None:
+    two = StationValues((device(PMM), device(PMC), device(PMC, {"6510:04": 500}, "wtg-07/blade-2/pmc-b")))
+    (found,) = check_station(two, RULES)
+    assert (found.verdict, found.details) == (Verdict.NOT_CHECKED, {"missing": "OAT PMC"})
+
+
+def test_a_station_of_other_devices_is_no_matter_of_a_rule() -> None:
+    assert check_station(StationValues((device("nanotec-pd4e", slug="a/b/c"),))) == []
