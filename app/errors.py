@@ -7,6 +7,7 @@
     │   ├── DescriptionError                a description or EDS file: file, line, reason
     │   ├── SiteError                       a site file: file, key, reason
     │   ├── SetFileError                    a parameter-set file: file, line, reason
+    │   ├── SigningKeyError                 the key that seals records cannot be made or read
     │   └── StoreError                      the store cannot be opened, read or written
     │       ├── StoreDamagedError           its file is damaged
     │       ├── StoreInUseError             another process has the data folder
@@ -97,6 +98,12 @@ class SetFileError(UsageError):
     """A parameter-set file is wrong. Details: file, line, reason."""
 
     code = "set_file"
+
+
+class SigningKeyError(UsageError):
+    """The key that seals records cannot be made or read. Details: file, reason."""
+
+    code = "signing_key"
 
 
 class StoreError(UsageError):
