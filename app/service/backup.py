@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final
 
@@ -15,23 +14,13 @@ from app.errors import BusLostError, HubsideError, SdoAbortError
 from app.model.address import Address
 from app.model.datatypes import Raw
 from app.model.description import Description
-from app.model.sets import Identity, Origin, ParameterSet, dump_set
+from app.model.sets import Origin, ParameterSet, dump_set, identity_of, iso_time
 from app.service.devices import Target, decode
 from app.wire.sdo import Abort
 
 DeviceProgress = Callable[[Target, int, int], None]
 """Called with the device, the objects done and the objects in all."""
-
-IDENTITY: Final = {
-    "device_type": Address(0x1000),
-    "device_name": Address(0x1008),
-    "hardware": Address(0x1009),
-    "software": Address(0x100A),
-    "vendor_id": Address(0x1018, 1),
-    "product_code": Address(0x1018, 2),
-    "revision": Address(0x1018, 3),
-    "serial": Address(0x1018, 4),
-}
+SECOND_NS: Final = 1_000_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,12 +86,11 @@ async def read_devices(
 def to_set(report: ReadReport, turbine: str, person: str, reason: str, wall_ns: int) -> ParameterSet:
     """The parameter set of a complete read."""
     target = report.target
-    time = datetime.fromtimestamp(wall_ns / 1e9, UTC).isoformat(timespec="seconds").replace("+00:00", "Z")
-    found = {key: report.values.get(address) for key, address in IDENTITY.items()}
+    time = iso_time(wall_ns // SECOND_NS * SECOND_NS)
     return ParameterSet(
         description_id=target.description.id,
         description_version=target.description.version,
-        identity=Identity(**found),  # type: ignore[arg-type]  # the types are those of the description
+        identity=identity_of(report.values),
         origin=Origin(turbine, target.slug, target.node, time, person, reason, f"hubside {__version__}"),
         values=report.values,
         unread={address: why(error) for address, error in report.failed.items() if not is_empty(error)},

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
-from datetime import UTC, datetime
 from typing import Final
 
 from app import __version__
 from app.errors import NoVisitError
 from app.model.address import Address
 from app.model.datatypes import Raw
-from app.model.sets import Identity, Origin, ParameterSet, dump_set, load_set
-from app.service.backup import IDENTITY, readable
+from app.model.sets import Origin, ParameterSet, dump_set, identity_of, iso_time, load_set
+from app.service.backup import SECOND_NS, readable
 from app.service.devices import Target, decode
 from app.service.office.audit import Action, AuditLog
 from app.store import visit_rows
@@ -133,12 +132,11 @@ def as_known(target: Target, turbine: str, person: str, now_ns: int) -> Paramete
             unread[address] = STALE
         else:
             values[address] = decode(target.entry(address), view.reading.data)
-    time = datetime.fromtimestamp(now_ns / 1e9, UTC).isoformat(timespec="seconds").replace("+00:00", "Z")
-    found = {key: values.get(address) for key, address in IDENTITY.items()}
+    time = iso_time(now_ns // SECOND_NS * SECOND_NS)
     return ParameterSet(
         description_id=target.description.id,
         description_version=target.description.version,
-        identity=Identity(**found),  # type: ignore[arg-type]  # the types are those of the description
+        identity=identity_of(values),
         origin=Origin(turbine, target.slug, target.node, time, person, "as left", f"hubside {__version__}"),
         values=values,
         unread=unread,
