@@ -50,6 +50,38 @@ STEPS: Final[tuple[tuple[str, ...], ...]] = (
             PRIMARY KEY (person, description_id, address)
         ) STRICT""",
     ),
+    (
+        "CREATE TABLE motors (id TEXT PRIMARY KEY NOT NULL, deleted_ns INTEGER) STRICT",
+        """CREATE TABLE motor_versions (
+            motor_id TEXT NOT NULL REFERENCES motors (id), version INTEGER NOT NULL, t_ns INTEGER NOT NULL,
+            person TEXT NOT NULL, source TEXT NOT NULL, origin TEXT NOT NULL, description_version TEXT NOT NULL,
+            content TEXT NOT NULL, PRIMARY KEY (motor_id, version)
+        ) STRICT""",
+        """CREATE TRIGGER motor_versions_never_change BEFORE UPDATE ON motor_versions
+            BEGIN SELECT RAISE(ABORT, 'versions of a motor are never changed'); END""",
+        """CREATE TABLE motor_devices (
+            id TEXT PRIMARY KEY NOT NULL, device TEXT NOT NULL, motor_id TEXT NOT NULL, version INTEGER NOT NULL,
+            t_ns INTEGER NOT NULL, person TEXT NOT NULL
+        ) STRICT""",
+        "CREATE INDEX motor_devices_device ON motor_devices (device, id)",
+    ),
+    (
+        """CREATE TABLE restores (
+            id TEXT PRIMARY KEY NOT NULL, turbine TEXT NOT NULL, station TEXT NOT NULL, state TEXT NOT NULL,
+            person TEXT NOT NULL, reason TEXT NOT NULL, work_order TEXT NOT NULL, started_ns INTEGER NOT NULL,
+            details TEXT NOT NULL, ended_ns INTEGER, outcome TEXT NOT NULL
+        ) STRICT""",
+        "CREATE INDEX restores_state ON restores (state, started_ns)",
+        """CREATE TABLE restore_values (
+            restore_id TEXT NOT NULL REFERENCES restores (id), n INTEGER NOT NULL, device TEXT NOT NULL,
+            address TEXT NOT NULL, before TEXT NOT NULL, wanted TEXT NOT NULL, PRIMARY KEY (restore_id, n)
+        ) STRICT""",
+        """CREATE TABLE restore_steps (
+            restore_id TEXT NOT NULL REFERENCES restores (id), n INTEGER NOT NULL, direction TEXT NOT NULL,
+            kind TEXT NOT NULL, device TEXT NOT NULL, address TEXT, raw TEXT, begun_ns INTEGER NOT NULL,
+            state TEXT NOT NULL, ended_ns INTEGER, details TEXT NOT NULL, PRIMARY KEY (restore_id, n)
+        ) STRICT""",
+    ),
 )
 SCHEMA: Final = len(STEPS)
 """The version that this program writes."""

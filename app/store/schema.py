@@ -94,3 +94,82 @@ favourites = Table(
     Column("address", Text, primary_key=True),
     Column("position", Integer, nullable=False),
 )
+
+motors = Table(
+    "motors",
+    metadata,
+    Column("id", Text, primary_key=True),
+    Column("deleted_ns", Integer),
+)
+"""A motor that was deleted is not listed any more; its versions stay readable."""
+
+motor_versions = Table(
+    "motor_versions",
+    metadata,
+    Column("motor_id", Text, ForeignKey("motors.id"), primary_key=True),
+    Column("version", Integer, primary_key=True),
+    Column("t_ns", Integer, nullable=False),
+    Column("person", Text, nullable=False),
+    Column("source", Text, nullable=False),
+    Column("origin", Text, nullable=False),
+    Column("description_version", Text, nullable=False),
+    Column("content", Text, nullable=False),
+)
+"""``content`` is a draft (``model.motor.dump_draft``). Rows are never changed."""
+
+motor_devices = Table(
+    "motor_devices",
+    metadata,
+    Column("id", Text, primary_key=True),
+    Column("device", Text, nullable=False),
+    Column("motor_id", Text, nullable=False),
+    Column("version", Integer, nullable=False),
+    Column("t_ns", Integer, nullable=False),
+    Column("person", Text, nullable=False),
+)
+"""Which motor a device drives: the newest row of a device counts. The motor may be an example, which is not stored."""
+
+restores = Table(
+    "restores",
+    metadata,
+    Column("id", Text, primary_key=True),
+    Column("turbine", Text, nullable=False),
+    Column("station", Text, nullable=False),
+    Column("state", Text, nullable=False),
+    Column("person", Text, nullable=False),
+    Column("reason", Text, nullable=False),
+    Column("work_order", Text, nullable=False),
+    Column("started_ns", Integer, nullable=False),
+    Column("details", Text, nullable=False),
+    Column("ended_ns", Integer),
+    Column("outcome", Text, nullable=False),
+)
+"""``details`` and ``outcome`` are JSON (see ``service.restore``)."""
+
+restore_values = Table(
+    "restore_values",
+    metadata,
+    Column("restore_id", Text, ForeignKey("restores.id"), primary_key=True),
+    Column("n", Integer, primary_key=True),
+    Column("device", Text, nullable=False),
+    Column("address", Text, nullable=False),
+    Column("before", Text, nullable=False),
+    Column("wanted", Text, nullable=False),
+)
+
+restore_steps = Table(
+    "restore_steps",
+    metadata,
+    Column("restore_id", Text, ForeignKey("restores.id"), primary_key=True),
+    Column("n", Integer, primary_key=True),
+    Column("direction", Text, nullable=False),
+    Column("kind", Text, nullable=False),
+    Column("device", Text, nullable=False),
+    Column("address", Text),
+    Column("raw", Text),
+    Column("begun_ns", Integer, nullable=False),
+    Column("state", Text, nullable=False),
+    Column("ended_ns", Integer),
+    Column("details", Text, nullable=False),
+)
+"""Each row is committed before its step is carried out."""
