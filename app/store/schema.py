@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sqlalchemy import Column, ForeignKey, Integer, MetaData, Table, Text
+from sqlalchemy import Column, ForeignKey, Integer, LargeBinary, MetaData, Table, Text
 
 metadata = MetaData()
 
@@ -173,3 +173,80 @@ restore_steps = Table(
     Column("details", Text, nullable=False),
 )
 """Each row is committed before its step is carried out."""
+
+set_layouts = Table(
+    "set_layouts",
+    metadata,
+    Column("id", Integer, primary_key=True),
+    Column("addresses", Text, nullable=False, unique=True),
+)
+"""Addresses in the order of a vector, with blanks between."""
+
+set_contents = Table(
+    "set_contents",
+    metadata,
+    Column("hash", Text, primary_key=True),
+    Column("description_id", Text, nullable=False),
+    Column("description_version", Text, nullable=False),
+    Column("identity", Text, nullable=False),
+    Column("content", Text, nullable=False),
+    Column("layout", Integer, ForeignKey("set_layouts.id"), nullable=False),
+    Column("vector", LargeBinary, nullable=False),
+)
+"""``hash`` is the SHA-256 of ``content`` (``ParameterSet.content``); ``vector`` holds its values (``set_vector``)."""
+
+set_records = Table(
+    "set_records",
+    metadata,
+    Column("id", Text, primary_key=True),
+    Column("hash", Text, ForeignKey("set_contents.hash"), nullable=False),
+    Column("turbine", Text, nullable=False),
+    Column("station", Text, nullable=False),
+    Column("device", Text, nullable=False),
+    Column("node", Integer, nullable=False),
+    Column("t_ns", Integer, nullable=False),
+    Column("person", Text, nullable=False),
+    Column("reason", Text, nullable=False),
+    Column("work_order", Text, nullable=False),
+    Column("tool", Text, nullable=False),
+    Column("unread", Text, nullable=False),
+    Column("empty", Text, nullable=False),
+    Column("source", Text, nullable=False),
+)
+"""An occasion on which a content was taken. ``unread`` (address: why) and ``empty`` are JSON."""
+
+set_tags = Table(
+    "set_tags",
+    metadata,
+    Column("seq", Integer, primary_key=True),
+    Column("tag", Text, nullable=False),
+    Column("scope", Text, nullable=False),
+    Column("visit_id", Text, ForeignKey("visits.id")),
+    Column("record_id", Text, ForeignKey("set_records.id")),
+    Column("person", Text, nullable=False),
+    Column("t_ns", Integer, nullable=False),
+)
+"""A history: of each tag, scope and visit the newest row counts; ``record_id`` NULL takes the tag off."""
+
+nameplates = Table(
+    "nameplates",
+    metadata,
+    Column("seq", Integer, primary_key=True),
+    Column("device", Text, nullable=False),
+    Column("serial", Text, nullable=False),
+    Column("person", Text, nullable=False),
+    Column("t_ns", Integer, nullable=False),
+)
+"""A history: of each device the newest row counts."""
+
+set_files = Table(
+    "set_files",
+    metadata,
+    Column("name", Text, primary_key=True),
+    Column("size_bytes", Integer, nullable=False),
+    Column("modified_ns", Integer, nullable=False),
+    Column("record_id", Text, ForeignKey("set_records.id")),
+    Column("line", Integer),
+    Column("reason", Text),
+)
+"""Set files of the data folder that were looked at: the record made of each, or the line and reason why none was."""
