@@ -7,6 +7,8 @@
     │   ├── DescriptionError                a description or EDS file: file, line, reason
     │   ├── SiteError                       a site file: file, key, reason
     │   ├── SetFileError                    a parameter-set file: file, line, reason
+    │   ├── ColumnError                     a column of a comparison that cannot be shown; names it
+    │   ├── MotorFileError                  a file of motors: file, line, column, reason
     │   ├── SigningKeyError                 the key that seals records cannot be made or read
     │   └── StoreError                      the store cannot be opened, read or written
     │       ├── StoreDamagedError           its file is damaged
@@ -33,6 +35,15 @@
     │   ├── UserExistsError                 the name is taken
     │   ├── UserRuleError                   a name or password that is not taken
     │   ├── LastExpertError                 one expert must remain
+    │   ├── MotorFieldError                 a field of a motor is missing or does not fit
+    │   ├── MotorUnknownError               no such motor, or no such version of it
+    │   ├── MotorChangedError               somebody else has changed the motor meanwhile
+    │   ├── MotorInventedError              the motor is an invented example
+    │   ├── RestoreOpenError                a restore of the station is not finished
+    │   ├── RestoreRefusedError             the pre-check of a restore found reasons against it
+    │   ├── RestoreChangedError             the plan of a restore is no longer the one that was looked at
+    │   ├── RestoreStateError               not in the state that a restore is in
+    │   ├── RestoreUnknownError             no such restore
     │   ├── NoInstructorError               the connected turbine is none of the twins that we started
     │   └── FaultOrderError                 a fault that cannot be put into a twin so; names the field
     │       └── FaultValueError             one of its values is out of range; names the limits
@@ -44,6 +55,7 @@
     │   ├── BusOpenError                    the adapter could not be opened
     │   └── TwinsGoneError                  the twins that we started do not answer
     ├── UnverifiedError            exit 6   sent, but what was read back differs or could not be read
+    ├── RestoreBrokenError         exit 6   a restore ended otherwise than ordered; says why
     ├── RecordingError             exit 2   a recording is damaged or cannot be written
     └── ProtocolError              exit 4   bytes on the wire that no rule of the protocol allows
 
@@ -104,6 +116,18 @@ class SigningKeyError(UsageError):
     """The key that seals records cannot be made or read. Details: file, reason."""
 
     code = "signing_key"
+
+
+class MotorFileError(UsageError):
+    """A file of motors is wrong; none was taken. Details: file, line, column, reason_key and what it is about."""
+
+    code = "motor_file"
+
+
+class ColumnError(UsageError):
+    """A column of a comparison cannot be shown. Details: column, reason_key."""
+
+    code = "column"
 
 
 class StoreError(UsageError):
@@ -257,6 +281,60 @@ class LastExpertError(RefusedError):
     code = "last_expert"
 
 
+class MotorFieldError(RefusedError):
+    """A field of a motor is missing or does not fit. Details: field, reason_key and what it is about."""
+
+    code = "motor_field"
+
+
+class MotorUnknownError(RefusedError):
+    """No such motor, or no such version of it. Details: motor."""
+
+    code = "motor_unknown"
+
+
+class MotorChangedError(RefusedError):
+    """The motor has another version than the one that was changed. Details: motor, version, newest."""
+
+    code = "motor_changed"
+
+
+class MotorInventedError(RefusedError):
+    """The motor is an invented example: never changed, deleted, or put into a real drive. Details: motor."""
+
+    code = "motor_invented"
+
+
+class RestoreOpenError(RefusedError):
+    """A restore of the station is not finished: its values may be half old, half new. Details: station, restore."""
+
+    code = "restore_open"
+
+
+class RestoreRefusedError(RefusedError):
+    """The pre-check found reasons against the restore; nothing was written. Details: station, reasons (texts)."""
+
+    code = "restore_refused"
+
+
+class RestoreChangedError(RefusedError):
+    """The station, or what is wanted, is no longer what the plan was made from. Details: station."""
+
+    code = "restore_changed"
+
+
+class RestoreStateError(RefusedError):
+    """The restore is in another state than this needs. Details: restore, state_key."""
+
+    code = "restore_state"
+
+
+class RestoreUnknownError(RefusedError):
+    """No such restore. Details: restore."""
+
+    code = "restore_unknown"
+
+
 class NoInstructorError(RefusedError):
     """Faults go only into twins that this server has started, and the connected turbine is none of them."""
 
@@ -331,6 +409,13 @@ class UnverifiedError(HubsideError):
     """Sent, but not verified. Details: address, name, sent, found, reason."""
 
     code = "unverified"
+    exit_code = 6
+
+
+class RestoreBrokenError(HubsideError):
+    """A restore ended otherwise than ordered. Details: station, device, cause_key (a text key), end_key."""
+
+    code = "restore_broken"
     exit_code = 6
 
 

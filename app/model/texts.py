@@ -23,10 +23,15 @@ class Texts:
     def __call__(self, key: str, /, **details: Any) -> str:
         """The text of ``key`` with its placeholders filled; a placeholder without a detail becomes a dash.
 
-        A detail ``reason_key`` is the key of a text, which fills ``{reason}``.
+        A detail ``reason_key`` is the key of a text, which fills ``{reason}``, and whose own placeholders are filled
+        likewise.
         """
-        words = {name.removesuffix("_key"): self._find(str(d)) for name, d in details.items() if name.endswith("_key")}
-        filled = {name: str(value) for name, value in details.items()}
+        filled = _Dashes((name, str(value)) for name, value in details.items())
+        words = {
+            name.removesuffix("_key"): self._find(str(key)).format_map(filled)
+            for name, key in details.items()
+            if name.endswith("_key")
+        }
         return self._find(key).format_map(_Dashes(words | filled))
 
     def _find(self, key: str) -> str:

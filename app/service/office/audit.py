@@ -54,6 +54,10 @@ class Action(Enum):
     VISIT_CONTINUED = "visit_continued"
     VISIT_ENDED = "visit_ended"
     VISIT_CHANGED = "visit_changed"
+    MOTOR_ADDED = "motor_added"
+    MOTOR_CHANGED = "motor_changed"
+    MOTOR_DELETED = "motor_deleted"
+    MOTOR_ASSIGNED = "motor_assigned"
 
     @property
     def text_key(self) -> str:

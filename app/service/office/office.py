@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from app.service.journal import Journal
+from app.service.motors import Motors
 from app.service.office.audit import AuditLog
 from app.service.office.sessions import Sessions
 from app.service.office.users import Users
@@ -13,9 +14,10 @@ from app.store.store import Store
 
 
 class Office:
-    """Audit log, users, sessions and visits of ``store``. ``stamp`` gives t_ns; every event of ``journal`` is audited.
+    """Audit log, users, sessions, visits and motors of ``store``. ``stamp`` gives t_ns.
 
-    ``person`` is who a launch token lets in. Raises StoreError. Belongs to the event loop, and owns the store.
+    Every event of ``journal`` is audited. ``person`` is who a launch token lets in. Raises StoreError. Belongs to the
+    event loop, and owns the store.
     """
 
     def __init__(self, store: Store, journal: Journal, stamp: Callable[[], int], person: str) -> None:
@@ -24,6 +26,7 @@ class Office:
         self.users = Users(store, self.audit)
         self.sessions = Sessions(store, self.users, self.audit, person)
         self.visits = Visits(store, self.audit, stamp)
+        self.motors = Motors(store, self.audit, stamp)
         self._stop_listening = journal.listen(self.audit.take)
 
     async def close(self) -> None:

@@ -24,7 +24,10 @@ export function translator(texts: Readonly<Record<string, string>>, language: La
 
 export const bootTranslator = (language: Language): Translate => translator(boot[language] ?? {}, language);
 
-/** Details that are keys themselves: `reason_key` and `text_key_reason` both fill the placeholder `reason` with a text. */
+/**
+ * Details that are keys themselves: `reason_key` and `text_key_reason` both fill the placeholder `reason` with a text,
+ * whose own placeholders are filled likewise.
+ */
 const KEY_NAMES = /^(?:(\w+)_key|text_key_(\w+))$/;
 
 function nested(texts: Readonly<Record<string, string>>, details: Details): Details {
@@ -32,7 +35,7 @@ function nested(texts: Readonly<Record<string, string>>, details: Details): Deta
   for (const [name, detail] of Object.entries(details)) {
     const match = KEY_NAMES.exec(name);
     if (!match || typeof detail !== "string") continue;
-    const text = texts[detail] ?? detail;
+    const text = fill(texts[detail] ?? detail, details);
     filled[name] = text;
     filled[match[1] ?? match[2] ?? name] ??= text;
   }
