@@ -37,7 +37,13 @@ _STATUS: Final[tuple[tuple[type[HubsideError], HTTPStatus], ...]] = (
     (errors.LastExpertError, HTTPStatus.CONFLICT),
     (errors.NoVisitError, HTTPStatus.CONFLICT),
     (errors.NoInstructorError, HTTPStatus.CONFLICT),
+    (errors.RestoreUnknownError, HTTPStatus.NOT_FOUND),
+    (errors.RestoreOpenError, HTTPStatus.CONFLICT),
+    (errors.RestoreRefusedError, HTTPStatus.CONFLICT),
+    (errors.RestoreChangedError, HTTPStatus.CONFLICT),
+    (errors.RestoreStateError, HTTPStatus.CONFLICT),
     (errors.RefusedError, HTTPStatus.UNPROCESSABLE_ENTITY),
+    (errors.ColumnError, HTTPStatus.NOT_FOUND),
     (errors.StoreError, HTTPStatus.SERVICE_UNAVAILABLE),
     (errors.UsageError, HTTPStatus.BAD_REQUEST),
     (errors.RecordingError, HTTPStatus.UNPROCESSABLE_ENTITY),
@@ -48,6 +54,7 @@ _STATUS: Final[tuple[tuple[type[HubsideError], HTTPStatus], ...]] = (
     (errors.DeviceError, HTTPStatus.BAD_GATEWAY),
     (errors.ProtocolError, HTTPStatus.BAD_GATEWAY),
     (errors.UnverifiedError, HTTPStatus.BAD_GATEWAY),
+    (errors.RestoreBrokenError, HTTPStatus.BAD_GATEWAY),
 )
 """The first that fits counts. 4xx: nothing was sent; 502 to 504: it was, and something on the bus went wrong."""
 

@@ -76,6 +76,7 @@ ROUTES: Final[dict[tuple[str, str], Role]] = {
     ("GET", "/api/sets/{turbine}/{file}"): VIEWER,
     ("GET", "/api/sets/{turbine}/{file}/download"): VIEWER,
     ("POST", "/api/live/backup"): TECHNICIAN,
+    ("POST", "/api/compare"): VIEWER,
     # faults in our own twins
     ("GET", "/api/instructor"): VIEWER,
     ("GET", "/api/instructor/catalogue"): VIEWER,

@@ -7,6 +7,7 @@ from fastapi import APIRouter
 from app.web.deps import ANY_PROBLEM
 from app.web.routes import (
     audit,
+    compare,
     devices,
     instructor,
     jobs,
@@ -31,6 +32,7 @@ FEATURES = (
     writes,
     recordings,
     sets,
+    compare,
     users,
     audit,
     visits,

@@ -64,6 +64,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/compare": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Compare
+         * @description Compare two or more columns. A column that cannot be shown is named by the problem.
+         */
+        post: operations["compare"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/favourites/{description_id}": {
         parameters: {
             query?: never;
@@ -1565,6 +1585,26 @@ export interface components {
             v: 1;
         };
         /**
+         * BitDoc
+         * @description One bit, or the field ``bit`` to ``last``, in every column; null where a column has no number there.
+         *
+         *     ``text_key`` null: no table names it.
+         */
+        BitDoc: {
+            /** Bit */
+            bit: number;
+            /** Clamp */
+            clamp: string;
+            /** Differs */
+            differs: boolean;
+            /** Last */
+            last: number;
+            /** Text Key */
+            text_key: string | null;
+            /** Values */
+            values: (number | null)[];
+        };
+        /**
          * BusDoc
          * @description A bus of a turbine; ``bitrate`` 0: the connection names it.
          */
@@ -1699,6 +1739,27 @@ export interface components {
             name: string;
         };
         /**
+         * CellDoc
+         * @description One value: ``shown`` in ``unit``; ``text_key`` where an enumeration names it; ``reason`` why it is unread.
+         */
+        CellDoc: {
+            /** Raw */
+            raw: number | string | null;
+            /** Reason */
+            reason: string;
+            /** Shown */
+            shown: string;
+            /**
+             * State
+             * @enum {string}
+             */
+            state: "value" | "not-in-set" | "not-on-device" | "unread" | "empty";
+            /** Text Key */
+            text_key: string | null;
+            /** Unit */
+            unit: string;
+        };
+        /**
          * ChangedDevice
          * @description One device; ``missing`` is the side on which nothing is known of it, ``replaced`` that another one answers.
          */
@@ -1766,6 +1827,113 @@ export interface components {
              * @constant
              */
             type: "subscribe";
+        };
+        /**
+         * ColumnDoc
+         * @description What stands above a column. ``t_ns`` null: of no time, as defaults; ``twin`` null: nothing says what it is of.
+         *
+         *     ``hash`` and ``record`` only where it is a kept set; ``complete``: nothing was left unread.
+         */
+        ColumnDoc: {
+            /** Complete */
+            complete: boolean;
+            /** Description Id */
+            description_id: string;
+            /** Description Version */
+            description_version: string;
+            /** Device */
+            device: string;
+            /** Hash */
+            hash: string | null;
+            /**
+             * Kind
+             * @enum {string}
+             */
+            kind: "live" | "stored" | "editor" | "default" | "set" | "file" | "golden" | "delivered" | "found" | "left" | "year";
+            /** Person */
+            person: string;
+            /** Reason */
+            reason: string;
+            /** Record */
+            record: string | null;
+            /** Spec */
+            spec: string;
+            /** T Ns */
+            t_ns: number | null;
+            /** Twin */
+            twin: boolean | null;
+        };
+        /**
+         * CompareRequest
+         * @description ``columns`` are specs such as ``live:wtg-07/blade-2/pmc``; ``pending`` are changes by device and address.
+         *
+         *     ``all`` compares process values too, else parameters only.
+         * @example {
+         *       "columns": [
+         *         "live:wtg-07/blade-1/pmc",
+         *         "default:wtg-07/blade-1/pmc"
+         *       ],
+         *       "pending": {}
+         *     }
+         */
+        CompareRequest: {
+            /**
+             * All
+             * @default false
+             */
+            all: boolean;
+            /** Columns */
+            columns: string[];
+            /** Pending */
+            pending?: {
+                [key: string]: {
+                    [key: string]: number | string;
+                };
+            };
+        };
+        /**
+         * CompareRow
+         * @description One address, a cell for each column. ``group`` is a key below ``group.``; ``restore`` its class.
+         *
+         *     ``rescaled``: equal raw values stand for other quantities, because what their unit rests on differs.
+         *     ``findings``: ids of the rules that are broken here, in any column.
+         */
+        CompareRow: {
+            /** Address */
+            address: string;
+            /** Bits */
+            bits: components["schemas"]["BitDoc"][];
+            /** Cells */
+            cells: components["schemas"]["CellDoc"][];
+            /** Findings */
+            findings: string[];
+            /** Group */
+            group: string;
+            /** Name */
+            name: string;
+            /** Rescaled */
+            rescaled: boolean;
+            /**
+             * Restore
+             * @enum {string}
+             */
+            restore: "copy" | "unit" | "factory" | "never";
+            /**
+             * State
+             * @enum {string}
+             */
+            state: "same" | "different" | "unit" | "missing" | "not-comparable";
+        };
+        /**
+         * ComparisonDoc
+         * @description Columns side by side: all rows, group by group; the page hides those that are the same.
+         */
+        ComparisonDoc: {
+            /** Columns */
+            columns: components["schemas"]["ColumnDoc"][];
+            /** Rows */
+            rows: components["schemas"]["CompareRow"][];
+            summary: components["schemas"]["SummaryDoc"];
         };
         /**
          * ConnectRequest
@@ -3341,6 +3509,24 @@ export interface components {
             state: "proven" | "saved";
         };
         /**
+         * SummaryDoc
+         * @description Rows by state: the first five add up to all. ``unread``: rows of any state in which a value was not read.
+         */
+        SummaryDoc: {
+            /** Different */
+            different: number;
+            /** Missing */
+            missing: number;
+            /** Not Comparable */
+            not_comparable: number;
+            /** Same */
+            same: number;
+            /** Unit */
+            unit: number;
+            /** Unread */
+            unread: number;
+        };
+        /**
          * TestRequest
          * @description ``sure``: the bit rate is known, so an adapter without a silent mode may listen at it.
          * @example {
@@ -3982,6 +4168,75 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["AuditVerified"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    compare: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "columns": [
+                 *         "live:wtg-07/blade-1/pmc",
+                 *         "default:wtg-07/blade-1/pmc"
+                 *       ],
+                 *       "pending": {}
+                 *     }
+                 */
+                "application/json": components["schemas"]["CompareRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ComparisonDoc"];
                 };
             };
             /** @description Unauthorized */

@@ -1,0 +1,1 @@
+"""What differs between any number of devices and sets. Pure."""

@@ -1,0 +1,25 @@
+"""The use case: resolve the columns, and compare them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from app.model.diff.compare import Comparison, compare
+from app.service.compare.sources import Columns, Pending, Shown
+
+
+@dataclass(frozen=True, slots=True)
+class Compared:
+    """The columns in their order, and what differs between them."""
+
+    columns: tuple[Shown, ...]
+    comparison: Comparison
+
+
+async def compare_columns(
+    columns: Columns, specs: Sequence[str], pending: Pending | None = None, everything: bool = False
+) -> Compared:
+    """Compare what ``specs`` name. Raises ColumnError, which names the column, StoreError, SetFileError."""
+    shown = tuple([await columns.resolve(spec, pending) for spec in specs])
+    return Compared(shown, compare([one.column for one in shown], everything))

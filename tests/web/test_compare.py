@@ -1,0 +1,68 @@
+"""Comparisons over HTTP, of real twins: columns, states, pending changes, and columns that cannot be shown."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from typing import Any
+
+import pytest
+
+from app.service.as_found import read_as_found
+from app.service.connection import Connection
+from tests.web.rig import Server, running
+
+PMM = "wtg-07/blade-1/pmm"
+PMC = "wtg-07/blade-1/pmc"
+
+
+@pytest.fixture
+async def server(connection: Connection) -> AsyncIterator[Server]:
+    async with running(connection) as started:
+        await read_as_found(connection, "tester")
+        yield started
+
+
+async def compared(server: Server, *columns: str, **more: Any) -> dict[str, Any]:
+    answer = await server.client.post("/api/compare", json={"columns": columns, **more})
+    assert answer.status_code == 200, answer.text
+    found: dict[str, Any] = answer.json()
+    counts = found["summary"]
+    counted = sum(counts[state] for state in ("different", "same", "unit", "missing", "not_comparable"))
+    assert counted == len(found["rows"])
+    return found
+
+
+def row(doc: dict[str, Any], address: str) -> dict[str, Any]:
+    found: dict[str, Any] = next(one for one in doc["rows"] if one["address"] == address)
+    return found
+
+
+async def test_the_same_device_twice_is_the_same(server: Server) -> None:
+    doc = await compared(server, f"live:{PMC}", f"live:{PMC}")
+    assert doc["summary"]["same"] == len(doc["rows"]) > 70
+    assert [(one["kind"], one["device"], one["twin"]) for one in doc["columns"]] == [("live", PMC, True)] * 2
+
+
+async def test_pending_changes_stand_beside_what_the_device_has(server: Server) -> None:
+    doc = await compared(server, f"live:{PMM}", f"editor:{PMM}", pending={PMM: {"3110:01": 490}})
+    changed = row(doc, "3110:01")
+    assert (changed["state"], changed["restore"]) == ("different", "copy")
+    assert [(cell["raw"], cell["shown"], cell["unit"]) for cell in changed["cells"]] == [
+        (500, "50.0", "°C"),
+        (490, "49.0", "°C"),
+    ]
+    assert doc["summary"]["different"] == 1
+
+
+async def test_a_column_that_cannot_be_shown_is_named(server: Server) -> None:
+    for column, reason in (
+        ("live:wtg-07/blade-9/pmm", "not-connected"),
+        ("default:wtg-99/blade-1/pmm", "no-device"),
+        ("left:wtg-07/blade-1/pmm", "no-visit"),
+        ("blade 1", "no-spec"),
+    ):
+        answer = await server.client.post("/api/compare", json={"columns": [f"live:{PMM}", column]})
+        problem = answer.json()
+        assert (answer.status_code, problem["code"], problem["details"]["column"]) == (404, "column", column)
+        assert problem["details"]["reason_key"] == f"compare.unresolved.{reason}"
+        assert column in problem["text"]
