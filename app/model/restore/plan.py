@@ -32,6 +32,8 @@ class Why(Enum):
     READ_ONLY = "read-only"
     UNREADABLE = "unreadable"
     """The device did not tell its present value, so that nothing could be undone."""
+    IRREVOCABLE = "irrevocable"
+    """The present value is out of its limits: the device would not take it back, so that nothing could be undone."""
     MISFIT = "misfit"
     """Outside of type, limits or enumeration; ``details`` say which."""
 
@@ -64,12 +66,16 @@ class StepKind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One step. ``place`` and ``raw`` for writes, ``device`` (its slug) for the others."""
+    """One step. ``place`` and ``raw`` for writes, ``device`` (its slug) for the others; none of them for CONFIRM.
+
+    ``until``: the step is done only when this object shows ``raw``; where it is None, reading ``place`` back proves it.
+    """
 
     kind: StepKind
     device: str
     place: Place | None = None
     raw: Raw | None = None
+    until: Place | None = None
 
 
 class Need(Enum):
@@ -83,8 +89,10 @@ class Need(Enum):
 class Plan:
     """A restore of one station.
 
+    ``restarts``: devices that must restart before all of it takes effect, because of the places ``after_restart``.
     ``findings``: what the rules say of the station as it will be; ``blockers``: those of them that forbid the restore;
-    ``unordered``: places for which no order of writes keeps all stepwise rules.
+    ``unordered``: places for which no order of writes keeps all stepwise rules and limits, in the station as it is
+    with all other rows written.
     """
 
     station: str
@@ -95,6 +103,7 @@ class Plan:
     findings: tuple[Finding, ...] = ()
     blockers: tuple[Finding, ...] = ()
     unordered: tuple[Place, ...] = ()
+    after_restart: tuple[Place, ...] = ()
 
     @property
     def runnable(self) -> bool:
