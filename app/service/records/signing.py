@@ -34,7 +34,8 @@ PUBLIC: Final = "hubside-key/1"
 SEAL: Final = "hubside-seal/1"
 NO_RENDERER: Final = "-"
 _SEAL_LINE: Final = re.compile(
-    rf"{SEAL} (record|html|pdf) ([a-z]{{2}}|-) ([0-9a-f]{{16}}|-) ([0-9a-f]{{64}}) ([A-Za-z0-9+/=]{{44}}) ([A-Za-z0-9+/=]{{88}})"
+    rf"{SEAL} (record|html|pdf) ([a-z]{{2}}|-) ([0-9a-f]{{16}}|-) ([0-9a-f]{{64}})"
+    r" ([A-Za-z0-9+/=]{44}) ([A-Za-z0-9+/=]{88})"
 )
 
 
