@@ -1,4 +1,4 @@
-"""``hubside verify``: is the record of a restore whole, and by which key was it sealed? Needs no server and no device."""
+"""``hubside verify``: is the record of a restore whole, and by which key was it sealed? Needs no server, no device."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from app.cli.output import Output
 from app.errors import UsageError
 from app.service.records.check import MAX_BYTES, Checked, Remade, Verdict, check_file
 from app.service.records.signing import PublicKey, SigningKey, parse_public_key, public_key_of
+from app.service.records.view import visible
 
 UNVERIFIED: Final = 6
 NO_RECORD: Final = 2
@@ -127,7 +128,7 @@ def _tell(path: Path, checked: Checked, output: Output) -> None:
     if output.as_json:
         output.result(_as_dict(path, checked), "")
         return
-    reason = f" ({checked.reason})" if checked.reason else ""
+    reason = f" ({visible(checked.reason)})" if checked.reason else ""
     output.line(f"{path}: {output.texts(checked.verdict.text_key)}{reason}")
     if checked.key is not None:
         owner = f" – {checked.owner}" if checked.owner else ""
@@ -136,7 +137,8 @@ def _tell(path: Path, checked: Checked, output: Output) -> None:
         output.line("  " + output.texts(checked.remade.text_key))
     record = checked.record
     if record is not None:
-        who = {"person": record.person, "time": record.ended, "station": record.station, "id": record.id}
+        said = {"person": record.person, "time": record.ended, "station": record.station, "id": record.id}
+        who = {name: visible(text) for name, text in said.items()}  # it may hold what a terminal obeys
         output.line("  " + output.texts("cli.verify_who", **who))
         output.line("  " + output.texts(record.outcome.text_key))
         if record.simulated:

@@ -146,7 +146,8 @@ def _signed(data: bytes, form: Form) -> SealedRecord:
         content = parsed(text)
     except (UnicodeDecodeError, RecordShapeError) as error:
         ours = SIGNED.encode("ascii") in data
-        raise _CheckError(Checked(Verdict.DAMAGED if ours else Verdict.NO_RECORD, form, reason=str(error))) from error
+        checked = Checked(Verdict.DAMAGED, form, reason=str(error)) if ours else Checked(Verdict.NO_RECORD)
+        raise _CheckError(checked) from error
     if not isinstance(content, dict) or not str(content.get("format", "")).startswith("hubside-"):
         raise _CheckError(Checked(Verdict.NO_RECORD, form))
     if content["format"] != SIGNED:
