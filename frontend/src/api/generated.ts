@@ -472,6 +472,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/live/devices/{turbine}/{station}/{device}/motor": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Add Motor Of Device
+         * @description Read the motor's parameters of a device over the wire, and add the motor with them.
+         */
+        post: operations["add_motor_of_device"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/live/devices/{turbine}/{station}/{device}/read": {
         parameters: {
             query?: never;
@@ -774,6 +794,176 @@ export interface paths {
          * @description End the session; its sockets close.
          */
         post: operations["logout"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/motors": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Motors
+         * @description The newest version of every motor, the invented examples last.
+         */
+        get: operations["motors"];
+        put?: never;
+        /**
+         * Add Motor
+         * @description Add a motor that was typed.
+         */
+        post: operations["add_motor"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/motors/compare": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Compare Motors
+         * @description Two of ``motor:ID``, ``motor:ID@VERSION`` and ``live:TURBINE/STATION/DEVICE`` beside each other.
+         *
+         *     Of a device that is what was last seen on the wire; nothing is sent.
+         */
+        get: operations["compare_motors"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/motors/export": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Export Motors
+         * @description Motors as CSV: those named, else all but the examples.
+         */
+        get: operations["export_motors"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/motors/form": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Motor Form
+         * @description What a form of a motor is drawn from: fields, units, limits and names of values.
+         */
+        get: operations["motor_form"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/motors/import": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Import Motors
+         * @description Take the motors of a CSV file: all of them or, where anything is wrong in it, none.
+         */
+        post: operations["import_motors"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/motors/{motor_id}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        /**
+         * Change Motor
+         * @description Make another version of a motor; those before stay readable.
+         */
+        put: operations["change_motor"];
+        post?: never;
+        /**
+         * Delete Motor
+         * @description List a motor no more; its versions stay readable.
+         */
+        delete: operations["delete_motor"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/motors/{motor_id}/assign": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Assign Motor
+         * @description Note that a device drives this motor: what it is compared with from now on. Nothing is sent.
+         */
+        post: operations["assign_motor"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/motors/{motor_id}/versions": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Motor Versions
+         * @description All versions of a motor, newest first, also of one that was deleted.
+         */
+        get: operations["motor_versions"];
+        put?: never;
+        post?: never;
         delete?: never;
         options?: never;
         head?: never;
@@ -1347,6 +1537,36 @@ export interface components {
             adapters: components["schemas"]["AdapterDoc"][];
             /** Places */
             places: components["schemas"]["PlaceDoc"][];
+        };
+        /**
+         * AssignedDoc
+         * @description Which motor a device drives, as somebody said or as it was put into the device.
+         */
+        AssignedDoc: {
+            /** Device */
+            device: string;
+            /** Motor Id */
+            motor_id: string;
+            /** Person */
+            person: string;
+            /** T Ns */
+            t_ns: number;
+            /** Version */
+            version: number;
+        };
+        /**
+         * Assignment
+         * @description ``device`` (a slug) drives this version of the motor.
+         * @example {
+         *       "device": "wtg-07/blade-2/pmc",
+         *       "version": 1
+         *     }
+         */
+        Assignment: {
+            /** Device */
+            device: string;
+            /** Version */
+            version: number;
         };
         /**
          * AttachmentRef
@@ -1982,6 +2202,53 @@ export interface components {
             slug: string;
         };
         /**
+         * DraftIn
+         * @description A motor as a person has it; ``values`` are raw, by address.
+         * @example {
+         *       "maker": "Lorentz",
+         *       "plate": {
+         *         "current_a": 11.3,
+         *         "pole_pairs": 1,
+         *         "power_kw": 5.5,
+         *         "speed_rpm": 2920,
+         *         "voltage_v": 400
+         *       },
+         *       "remarks": "measured on the bench",
+         *       "type": "PM 5.5-2",
+         *       "values": {
+         *         "6076": 11300,
+         *         "6402": 7,
+         *         "6410:03": 4000
+         *       }
+         *     }
+         */
+        DraftIn: {
+            /** Maker */
+            maker: string;
+            /**
+             * @default {
+             *       "brake": "",
+             *       "encoder": "",
+             *       "temperature_sensor": ""
+             *     }
+             */
+            plate: components["schemas"]["PlateDoc"];
+            /**
+             * Remarks
+             * @default
+             */
+            remarks: string;
+            /** Type */
+            type: string;
+            /**
+             * Values
+             * @default {}
+             */
+            values: {
+                [key: string]: number;
+            };
+        };
+        /**
          * EmcyLine
          * @description One emergency message; ``reset``: it tells that an error is gone.
          */
@@ -2594,6 +2861,194 @@ export interface components {
             t_ns: number;
         };
         /**
+         * MotorChange
+         * @description Another version of a motor, made from version ``based_on``.
+         * @example {
+         *       "based_on": 1,
+         *       "maker": "Lorentz",
+         *       "plate": {
+         *         "current_a": 11.3,
+         *         "pole_pairs": 1,
+         *         "power_kw": 5.5,
+         *         "speed_rpm": 2920,
+         *         "voltage_v": 400
+         *       },
+         *       "remarks": "measured on the bench",
+         *       "type": "PM 5.5-2",
+         *       "values": {
+         *         "6076": 11300,
+         *         "6402": 7,
+         *         "6410:03": 4000
+         *       }
+         *     }
+         */
+        MotorChange: {
+            /** Based On */
+            based_on: number;
+            /** Maker */
+            maker: string;
+            /**
+             * @default {
+             *       "brake": "",
+             *       "encoder": "",
+             *       "temperature_sensor": ""
+             *     }
+             */
+            plate: components["schemas"]["PlateDoc"];
+            /**
+             * Remarks
+             * @default
+             */
+            remarks: string;
+            /** Type */
+            type: string;
+            /**
+             * Values
+             * @default {}
+             */
+            values: {
+                [key: string]: number;
+            };
+        };
+        /**
+         * MotorComparison
+         * @description Two motors, or a motor and a device. The plate is compared between motors only.
+         */
+        MotorComparison: {
+            left: components["schemas"]["SideDoc"];
+            /** Plate */
+            plate: components["schemas"]["PlateRowDoc"][];
+            right: components["schemas"]["SideDoc"];
+            /** Values */
+            values: components["schemas"]["ValueRowDoc"][];
+        };
+        /**
+         * MotorDoc
+         * @description One version of a motor; ``values`` are raw, by address. ``origin``: a device's slug, or a file.
+         *
+         *     ``disagreements``: fields of the plate whose parameter says another number.
+         */
+        MotorDoc: {
+            /** Deleted */
+            deleted: boolean;
+            /** Disagreements */
+            disagreements: string[];
+            /** Id */
+            id: string;
+            /** Invented */
+            invented: boolean;
+            /** Maker */
+            maker: string;
+            /** Origin */
+            origin: string;
+            /** Person */
+            person: string;
+            plate: components["schemas"]["PlateDoc"];
+            /** Remarks */
+            remarks: string;
+            /**
+             * Source
+             * @enum {string}
+             */
+            source: "typed" | "device" | "file" | "example";
+            /** T Ns */
+            t_ns: number;
+            /** Type */
+            type: string;
+            /** Values */
+            values: {
+                [key: string]: number;
+            };
+            /** Version */
+            version: number;
+        };
+        /**
+         * MotorFile
+         * @description A CSV file of motors: its name, and its bytes in base64.
+         * @example {
+         *       "data": "bWFrZXIsdHlwZQpMb3JlbnR6LFBNCg==",
+         *       "name": "motors.csv"
+         *     }
+         */
+        MotorFile: {
+            /**
+             * Data
+             * Format: base64
+             */
+            data: string;
+            /** Name */
+            name: string;
+        };
+        /**
+         * MotorForm
+         * @description What a form of a motor is drawn from: the fields of the plate, and the description of its parameters alone.
+         */
+        MotorForm: {
+            /** Description */
+            description: {
+                [key: string]: unknown;
+            };
+            /** Plate */
+            plate: components["schemas"]["PlateFieldDoc"][];
+        };
+        /**
+         * MotorFromDevice
+         * @description What a device does not tell of its motor; the values are read from it.
+         * @example {
+         *       "maker": "Lorentz",
+         *       "plate": {
+         *         "current_a": 11.3,
+         *         "pole_pairs": 1,
+         *         "power_kw": 5.5,
+         *         "speed_rpm": 2920,
+         *         "voltage_v": 400
+         *       },
+         *       "remarks": "",
+         *       "type": "PM 5.5-2"
+         *     }
+         */
+        MotorFromDevice: {
+            /** Maker */
+            maker: string;
+            /**
+             * @default {
+             *       "brake": "",
+             *       "encoder": "",
+             *       "temperature_sensor": ""
+             *     }
+             */
+            plate: components["schemas"]["PlateDoc"];
+            /**
+             * Remarks
+             * @default
+             */
+            remarks: string;
+            /** Type */
+            type: string;
+        };
+        /**
+         * MotorList
+         * @description The newest version of every motor, examples last, and which device drives which.
+         */
+        MotorList: {
+            /** Assigned */
+            assigned: components["schemas"]["AssignedDoc"][];
+            /** Motors */
+            motors: components["schemas"]["MotorDoc"][];
+        };
+        /**
+         * MotorsTaken
+         * @description What a file brought: motors that were not known, new versions, and those that say nothing new.
+         */
+        MotorsTaken: {
+            /** Added */
+            added: components["schemas"]["MotorDoc"][];
+            /** Changed */
+            changed: components["schemas"]["MotorDoc"][];
+            /** Unchanged */
+            unchanged: components["schemas"]["MotorDoc"][];
+        };
+        /**
          * NewUser
          * @description A user to be made. The first one is an expert, whatever role is named.
          */
@@ -2737,6 +3192,76 @@ export interface components {
             interface: string;
             /** Reason */
             reason: string;
+        };
+        /**
+         * PlateDoc
+         * @description What the type plate says; null or "" where it says nothing. Units are in the names.
+         */
+        PlateDoc: {
+            /**
+             * Brake
+             * @default
+             */
+            brake: string;
+            /** Current A */
+            current_a?: number | null;
+            /**
+             * Encoder
+             * @default
+             */
+            encoder: string;
+            /** Pole Pairs */
+            pole_pairs?: number | null;
+            /** Power Kw */
+            power_kw?: number | null;
+            /** Speed Rpm */
+            speed_rpm?: number | null;
+            /**
+             * Temperature Sensor
+             * @default
+             */
+            temperature_sensor: string;
+            /** Torque Nm */
+            torque_nm?: number | null;
+            /** Voltage V */
+            voltage_v?: number | null;
+        };
+        /**
+         * PlateFieldDoc
+         * @description One field of the plate: a number within limits, or words. ``address``: the parameter that says the same.
+         */
+        PlateFieldDoc: {
+            /** Address */
+            address: string | null;
+            /** Decimals */
+            decimals: number;
+            /** Maximum */
+            maximum: number | null;
+            /** Minimum */
+            minimum: number | null;
+            /** Name */
+            name: string;
+            /** Text */
+            text: boolean;
+            /** Unit */
+            unit: string;
+        };
+        /**
+         * PlateRowDoc
+         * @description One field of the plate on both sides.
+         */
+        PlateRowDoc: {
+            /** Field */
+            field: string;
+            /** Left */
+            left: number | string | null;
+            /** Right */
+            right: number | string | null;
+            /**
+             * State
+             * @enum {string}
+             */
+            state: "different" | "same" | "missing" | "unit";
         };
         /**
          * PlayRequest
@@ -3383,6 +3908,15 @@ export interface components {
             total: number;
         };
         /**
+         * SideDoc
+         * @description One side of a comparison: a version of a motor, or what a device was last seen to hold (``motor`` null).
+         */
+        SideDoc: {
+            /** Device */
+            device: string | null;
+            motor: components["schemas"]["MotorDoc"] | null;
+        };
+        /**
          * SiteDeviceDoc
          * @description A device; ``slug`` is its own part of the path.
          */
@@ -3866,6 +4400,23 @@ export interface components {
             stored: components["schemas"]["StoredCell"] | null;
             /** T Ns */
             t_ns: number | null;
+        };
+        /**
+         * ValueRowDoc
+         * @description One parameter on both sides, raw.
+         */
+        ValueRowDoc: {
+            /** Address */
+            address: string;
+            /** Left */
+            left: number | null;
+            /** Right */
+            right: number | null;
+            /**
+             * State
+             * @enum {string}
+             */
+            state: "different" | "same" | "missing" | "unit";
         };
         /**
          * ValuesData
@@ -5733,6 +6284,129 @@ export interface operations {
             };
         };
     };
+    add_motor_of_device: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                turbine: string;
+                station: string;
+                device: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "maker": "Lorentz",
+                 *       "plate": {
+                 *         "current_a": 11.3,
+                 *         "pole_pairs": 1,
+                 *         "power_kw": 5.5,
+                 *         "speed_rpm": 2920,
+                 *         "voltage_v": 400
+                 *       },
+                 *       "remarks": "",
+                 *       "type": "PM 5.5-2"
+                 *     }
+                 */
+                "application/json": components["schemas"]["MotorFromDevice"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["MotorDoc"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Conflict */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Bad Gateway */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Service Unavailable */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Gateway Timeout */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
     read: {
         parameters: {
             query?: never;
@@ -7009,6 +7683,644 @@ export interface operations {
             };
             /** @description Unprocessable Entity */
             422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    motors: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["MotorList"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    add_motor: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "maker": "Lorentz",
+                 *       "plate": {
+                 *         "current_a": 11.3,
+                 *         "pole_pairs": 1,
+                 *         "power_kw": 5.5,
+                 *         "speed_rpm": 2920,
+                 *         "voltage_v": 400
+                 *       },
+                 *       "remarks": "measured on the bench",
+                 *       "type": "PM 5.5-2",
+                 *       "values": {
+                 *         "6076": 11300,
+                 *         "6402": 7,
+                 *         "6410:03": 4000
+                 *       }
+                 *     }
+                 */
+                "application/json": components["schemas"]["DraftIn"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["MotorDoc"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    compare_motors: {
+        parameters: {
+            query: {
+                left: string;
+                right: string;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["MotorComparison"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    export_motors: {
+        parameters: {
+            query?: {
+                ids?: string[] | null;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    motor_form: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["MotorForm"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    import_motors: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "data": "bWFrZXIsdHlwZQpMb3JlbnR6LFBNCg==",
+                 *       "name": "motors.csv"
+                 *     }
+                 */
+                "application/json": components["schemas"]["MotorFile"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["MotorsTaken"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    change_motor: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                motor_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "based_on": 1,
+                 *       "maker": "Lorentz",
+                 *       "plate": {
+                 *         "current_a": 11.3,
+                 *         "pole_pairs": 1,
+                 *         "power_kw": 5.5,
+                 *         "speed_rpm": 2920,
+                 *         "voltage_v": 400
+                 *       },
+                 *       "remarks": "measured on the bench",
+                 *       "type": "PM 5.5-2",
+                 *       "values": {
+                 *         "6076": 11300,
+                 *         "6402": 7,
+                 *         "6410:03": 4000
+                 *       }
+                 *     }
+                 */
+                "application/json": components["schemas"]["MotorChange"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["MotorDoc"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    delete_motor: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                motor_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Nothing"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    assign_motor: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                motor_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "device": "wtg-07/blade-2/pmc",
+                 *       "version": 1
+                 *     }
+                 */
+                "application/json": components["schemas"]["Assignment"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Nothing"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    motor_versions: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                motor_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["MotorDoc"][];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
                 headers: {
                     [name: string]: unknown;
                 };
