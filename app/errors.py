@@ -44,6 +44,9 @@
     │   ├── RestoreChangedError             the plan of a restore is no longer the one that was looked at
     │   ├── RestoreStateError               not in the state that a restore is in
     │   ├── RestoreUnknownError             no such restore
+    │   ├── SetUnknownError                 no such parameter set
+    │   ├── SetTagError                     a tag that visits give, not people
+    │   ├── NameplateError                  a serial number that is none, or typed differently twice
     │   ├── NoInstructorError               the connected turbine is none of the twins that we started
     │   └── FaultOrderError                 a fault that cannot be put into a twin so; names the field
     │       └── FaultValueError             one of its values is out of range; names the limits
@@ -333,6 +336,24 @@ class RestoreUnknownError(RefusedError):
     """No such restore. Details: restore."""
 
     code = "restore_unknown"
+
+
+class SetUnknownError(RefusedError):
+    """No such parameter set in the library. Details: set."""
+
+    code = "set_unknown"
+
+
+class SetTagError(RefusedError):
+    """Visits give this tag, not people. Details: tag."""
+
+    code = "set_tag"
+
+
+class NameplateError(RefusedError):
+    """The serial number of a nameplate is none, or the second entry differs. Details: device, reason_key."""
+
+    code = "nameplate"
 
 
 class NoInstructorError(RefusedError):

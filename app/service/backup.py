@@ -83,7 +83,9 @@ async def read_devices(
     return [task.result() for task in tasks]
 
 
-def to_set(report: ReadReport, turbine: str, person: str, reason: str, wall_ns: int) -> ParameterSet:
+def to_set(
+    report: ReadReport, turbine: str, person: str, reason: str, wall_ns: int, work_order: str = ""
+) -> ParameterSet:
     """The parameter set of a complete read."""
     target = report.target
     time = iso_time(wall_ns // SECOND_NS * SECOND_NS)
@@ -91,7 +93,7 @@ def to_set(report: ReadReport, turbine: str, person: str, reason: str, wall_ns: 
         description_id=target.description.id,
         description_version=target.description.version,
         identity=identity_of(report.values),
-        origin=Origin(turbine, target.slug, target.node, time, person, reason, f"hubside {__version__}"),
+        origin=Origin(turbine, target.slug, target.node, time, person, reason, f"hubside {__version__}", work_order),
         values=report.values,
         unread={address: why(error) for address, error in report.failed.items() if not is_empty(error)},
         empty=tuple(address for address, error in report.failed.items() if is_empty(error)),

@@ -138,7 +138,7 @@ class Bench:
             visits = self.office.visits
             visits.require()
             if self.connection is not None:
-                await visits.keep_left(self.connection.targets, person)
+                await visits.keep_left(self.connection.targets, person, work_order)
             visit = await visits.end(reason, work_order, person)
             await self._end(person)
             return visit
@@ -195,7 +195,9 @@ class Bench:
             for error in unreachable(reports).values():
                 self._told(error)
             slug, now_ns = connection.turbine.slug, self._clocks[0]()
-            found = [to_set(report, slug, person, REASON, now_ns) for report in reports if report.values]
+            order = "" if self.office.visits.current is None else self.office.visits.current.work_order
+            whole = [to_set(report, slug, person, REASON, now_ns, order) for report in reports if report.values]
+            found = [self.office.library.identified(one) for one in whole]
             await self._keep(self.office.visits.keep_found(found))
         poller = Poller(connection, lambda: self.polling.plan)
         try:

@@ -9,16 +9,18 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
-from sqlalchemy import Connection, Row, Select, func, insert, select
+from sqlalchemy import Connection as Connection
+from sqlalchemy import Row, Select, delete, func, insert, select
 
 from app.model.address import parse_address
 from app.model.set_record import SetRecord, Source, Tag, TagEntry
 from app.model.set_vector import layout_of, pack
 from app.model.sets import Identity, Origin, ParameterSet, iso_time, parse_content
 from app.store.schema import nameplates, set_contents, set_layouts, set_records, set_tags
+from app.store.schema import set_files as files
 
 _SHORTEST_HASH = 8
 
@@ -179,6 +181,44 @@ def nameplates_now(connection: Connection) -> dict[str, Nameplate]:
     """What is known of each device, by slug."""
     query = select(nameplates).order_by(nameplates.c.seq)
     return {row.device: Nameplate(row.device, row.serial, row.person, row.t_ns) for row in connection.execute(query)}
+
+
+# -- files ------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class SetFileRow:
+    """A set file that was looked at: the record made of it, or line and reason why none was."""
+
+    name: str
+    size_bytes: int
+    modified_ns: int
+    record_id: str | None
+    line: int | None = None
+    reason: str | None = None
+
+    @property
+    def stat(self) -> tuple[int, int]:
+        """By which a changed file is known."""
+        return self.size_bytes, self.modified_ns
+
+
+def set_files(connection: Connection) -> dict[str, SetFileRow]:
+    """The files that were looked at, by name."""
+    rows = connection.execute(select(files).order_by(files.c.name))
+    return {row.name: SetFileRow(**row._mapping) for row in rows}
+
+
+def put_file(connection: Connection, row: SetFileRow) -> None:
+    """Keep what a look at a file gave, in the place of an earlier one."""
+    forget_files(connection, [row.name])
+    connection.execute(insert(files), asdict(row))
+
+
+def forget_files(connection: Connection, names: Iterable[str]) -> None:
+    """Files that are gone; the records that were made of them stay."""
+    for name in names:
+        connection.execute(delete(files).where(files.c.name == name))
 
 
 # ---------------------------------------------------------------------------------------

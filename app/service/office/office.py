@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from app.service.journal import Journal
+from app.service.library.library import Library
 from app.service.motors import Motors
 from app.service.office.audit import AuditLog
 from app.service.office.sessions import Sessions
@@ -25,7 +26,8 @@ class Office:
         self.audit = AuditLog(store, stamp, journal)
         self.users = Users(store, self.audit)
         self.sessions = Sessions(store, self.users, self.audit, person)
-        self.visits = Visits(store, self.audit, stamp)
+        self.library = Library(store, self.audit, stamp)
+        self.visits = Visits(store, self.audit, stamp, self.library)
         self.motors = Motors(store, self.audit, stamp)
         self._stop_listening = journal.listen(self.audit.take)
 

@@ -10,18 +10,21 @@ from app import __version__
 from app.errors import NoVisitError
 from app.model.address import Address
 from app.model.datatypes import Raw
+from app.model.set_record import Tag
 from app.model.sets import Origin, ParameterSet, dump_set, identity_of, iso_time, load_set
 from app.service.backup import SECOND_NS, readable
 from app.service.devices import Target, decode
+from app.service.library.library import Library
 from app.service.office.audit import Action, AuditLog
 from app.store import visit_rows
-from app.store.store import Store
+from app.store.store import Connection, Store
 from app.store.uuid7 import Uuid7
 from app.store.visit_rows import Phase, Visit
 
 GOES_ON_NS: Final = 12 * 3600 * 1_000_000_000
 """Connecting again within so long after its beginning goes on with a visit: a shift."""
 NOT_READ: Final = "not read"
+TAGS: Final = {Phase.FOUND: Tag.AS_FOUND, Phase.LEFT: Tag.AS_LEFT}
 STALE: Final = "stale"
 """Frames were lost, or the same quantity was written elsewhere: what was read last proves nothing."""
 
@@ -29,7 +32,8 @@ STALE: Final = "stale"
 class Visits:
     """The visits of one store. ``stamp`` gives t_ns. Lives in the event loop."""
 
-    def __init__(self, store: Store, audit: AuditLog, stamp: Callable[[], int]) -> None:
+    def __init__(self, store: Store, audit: AuditLog, stamp: Callable[[], int], library: Library | None = None) -> None:
+        self._library = library or Library(store, audit, stamp)
         self._store = store
         self._audit = audit
         self._stamp = stamp
@@ -68,15 +72,17 @@ class Visits:
         """Keep the values as found; those of an earlier connection in the same visit stay. Raises StoreError."""
         visit = self.current
         if visit is not None:
-            await self._keep(visit, Phase.FOUND, sets)
+            await self._keep(visit, Phase.FOUND, sets, visit.person)
         self.looked = True
 
-    async def keep_left(self, targets: Iterable[Target], person: str) -> None:
+    async def keep_left(self, targets: Iterable[Target], person: str, work_order: str | None = None) -> None:
         """Keep what is known of the devices now, in the place of what was kept before. Raises StoreError."""
         visit = self.current
         if visit is not None:
             now_ns = self._stamp()
-            await self._keep(visit, Phase.LEFT, [as_known(one, visit.turbine, person, now_ns) for one in targets])
+            order = visit.work_order if work_order is None else work_order
+            known = [as_known(one, visit.turbine, person, now_ns, order) for one in targets]
+            await self._keep(visit, Phase.LEFT, [self._library.identified(one) for one in known], person)
 
     async def end(self, reason: str, work_order: str, person: str) -> Visit:
         """End the open visit. Raises NoVisitError, StoreError."""
@@ -114,12 +120,19 @@ class Visits:
     async def _put(self, visit: Visit) -> None:
         await self._store.run(lambda connection: visit_rows.put_visit(connection, visit))
 
-    async def _keep(self, visit: Visit, phase: Phase, sets: Iterable[ParameterSet]) -> None:
-        texts = {one.origin.device: dump_set(one) for one in sets if one.values}
-        await self._store.run(lambda connection: visit_rows.keep_sets(connection, visit.id, phase, texts))
+    async def _keep(self, visit: Visit, phase: Phase, sets: Iterable[ParameterSet], person: str) -> None:
+        """Keep the sets with the visit and, in the same transaction, in the library."""
+        kept = [one for one in sets if one.values]
+        texts = {one.origin.device: dump_set(one) for one in kept}
+
+        def work(connection: Connection) -> None:
+            visit_rows.keep_sets(connection, visit.id, phase, texts)
+            self._library.keep_visit(connection, kept, TAGS[phase], visit.id, person)
+
+        await self._store.run(work)
 
 
-def as_known(target: Target, turbine: str, person: str, now_ns: int) -> ParameterSet:
+def as_known(target: Target, turbine: str, person: str, now_ns: int, work_order: str = "") -> ParameterSet:
     """The parameter set of what the live state knows now; nothing is read for it."""
     views = target.live.values(target.device.bus, target.node)
     values: dict[Address, Raw] = {}
@@ -137,7 +150,7 @@ def as_known(target: Target, turbine: str, person: str, now_ns: int) -> Paramete
         description_id=target.description.id,
         description_version=target.description.version,
         identity=identity_of(values),
-        origin=Origin(turbine, target.slug, target.node, time, person, "as left", f"hubside {__version__}"),
+        origin=Origin(turbine, target.slug, target.node, time, person, "as left", f"hubside {__version__}", work_order),
         values=values,
         unread=unread,
     )
