@@ -31,6 +31,7 @@ COMMANDS: Final = {
     "users": ("users",),
     "audit": ("audit",),
     "store": ("store",),
+    "motors": ("motors",),
     "verify": ("verify",),
 }
 """Modules of this package, each with ``add_parser``, and the commands that it adds."""
