@@ -37,7 +37,7 @@ export function signedOut(): void {
   tellSignedOut();
 }
 
-async function request<T>(path: string, init: RequestInit): Promise<T> {
+async function answerOf(path: string, init: RequestInit): Promise<Response> {
   let response: Response;
   try {
     response = await fetch(path, { credentials: "same-origin", ...init });
@@ -46,7 +46,11 @@ async function request<T>(path: string, init: RequestInit): Promise<T> {
   }
   if (response.status === UNAUTHORISED && !SIGNING_IN.includes(path)) signedOut();
   if (!response.ok) throw new Problem(await problemOf(response));
-  return (await response.json()) as T;
+  return response;
+}
+
+async function request<T>(path: string, init: RequestInit): Promise<T> {
+  return (await (await answerOf(path, init)).json()) as T;
 }
 
 async function problemOf(response: Response): Promise<ProblemDoc> {
@@ -78,6 +82,13 @@ export function send<T>(method: "POST" | "PUT" | "PATCH", path: string, body: ob
     headers: { "content-type": "application/json" },
     body: JSON.stringify(body),
   });
+}
+
+/** Sends JSON and gets a file. */
+export async function sendForFile(path: string, body: object): Promise<Blob> {
+  const headers = { "content-type": "application/json" };
+  const answer = await answerOf(path, { method: "POST", headers, body: JSON.stringify(body) });
+  return answer.blob();
 }
 
 export function remove<T>(path: string): Promise<T> {

@@ -78,6 +78,8 @@ export interface PageSearch {
   golden?: string;
   station?: string;
   sets?: string;
+  /** Addresses that are picked to be restored, separated by commas. */
+  select?: string;
   motor?: string;
   /** The restore that is open. */
   restore?: string;
@@ -123,6 +125,7 @@ const TEXTS = [
   "golden",
   "station",
   "sets",
+  "select",
   "motor",
   "restore",
 ] as const;

@@ -19,7 +19,11 @@ function quoted(cell: string): string {
 const BOM = "\uFEFF";
 
 export function download(name: string, text: string): void {
-  const url = URL.createObjectURL(new Blob([BOM, text], { type: "text/csv;charset=utf-8" }));
+  downloadBlob(name, new Blob([BOM, text], { type: "text/csv;charset=utf-8" }));
+}
+
+export function downloadBlob(name: string, blob: Blob): void {
+  const url = URL.createObjectURL(blob);
   const link = document.createElement("a");
   link.href = url;
   link.download = name;

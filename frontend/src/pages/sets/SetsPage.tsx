@@ -30,6 +30,9 @@ const NO_TAB = {
   golden: undefined,
   station: undefined,
   sets: undefined,
+  select: undefined,
+  closed: undefined,
+  edit: undefined,
   motor: undefined,
   restore: undefined,
 } satisfies { [K in keyof PageSearch]?: undefined };
