@@ -1,8 +1,8 @@
-"""Values of a set as a vector: one word of eight bytes an address, so that thousands of sets are compared at once.
+"""Values of a set as a vector of words of four bytes, so that thousands of sets are compared at once.
 
-A *layout* is the tuple of addresses that a set has values of, in the order of the words. Sets that were read the same
-way share it, so a store keeps each layout once. A word says whether two values of one address are equal; numbers can
-be read back from it, texts and octets cannot.
+A *layout* names the addresses that a set has values of, in the order of the words: ``6065:00`` for one word,
+``1008:00*2`` where the value takes two. Sets that were read the same way share it, so a store keeps each layout once.
+Words say whether two values are equal; numbers can be read back from them, texts and octets cannot.
 """
 
 from __future__ import annotations
@@ -15,25 +15,50 @@ from typing import Final
 from app.model.address import Address, parse_address
 from app.model.datatypes import Raw
 
-WIDTH: Final = 8
-"""Bytes of a word. Every integer of CiA 301 fits."""
-_MASK: Final = (1 << 8 * WIDTH) - 1
+WIDTH: Final = 4
+"""Bytes of a word."""
+_TWO: Final = "*2"
+_NARROW: Final = range(-(1 << 31), 1 << 32)
+"""Integers of one word. -1 and FFFFFFFFh have the same, and no type of 32 bits or less holds both."""
+_MASK: Final = (1 << 64) - 1
 
 
 def layout_of(values: Mapping[Address, Raw]) -> tuple[str, ...]:
-    """The addresses that ``values`` has, as text, in their order."""
-    return tuple(str(address) for address in sorted(values, key=lambda one: one[:2]))
+    """The addresses that ``values`` has, in their order, each with the room that its value takes."""
+    ordered = sorted(values, key=lambda one: one[:2])
+    return tuple(f"{address}{'' if _narrow(values[address]) else _TWO}" for address in ordered)
 
 
 def pack(values: Mapping[Address, Raw], layout: Sequence[str]) -> bytes:
-    """The words of ``values`` in the order of ``layout``. Raises KeyError where an address of it has no value."""
-    return b"".join(word(values[parse_address(text)]) for text in layout)
+    """The words of ``values`` in the order of ``layout``, which must be theirs. Raises KeyError where it is not."""
+    return b"".join(words(values[address], count) for address, count in parse_layout(layout))
 
 
-def word(raw: Raw) -> bytes:
-    """One value: integers in two's complement, floats as IEEE 754, little-endian; of anything else a digest."""
+def parse_layout(layout: Sequence[str]) -> list[tuple[Address, int]]:
+    """The addresses of a layout, each with the number of its words."""
+    return [(parse_address(text.removesuffix(_TWO)), 2 if text.endswith(_TWO) else 1) for text in layout]
+
+
+def words(raw: Raw, count: int) -> bytes:
+    """One value: integers in two's complement, floats as IEEE 754, little-endian; of anything else a digest.
+
+    Raises KeyError where it needs another number of words.
+    """
+    if count != (1 if _narrow(raw) else 2):
+        raise KeyError(f"{raw!r} does not take {count}")
     if isinstance(raw, int):
-        return (raw & _MASK).to_bytes(WIDTH, "little")
+        return (raw & _MASK).to_bytes(2 * WIDTH, "little")[: WIDTH * count]
+    return exact(raw)
+
+
+def exact(raw: Raw) -> bytes:
+    """Equal for equal values of one type only, whatever that is; not-a-number equals itself."""
+    if isinstance(raw, int):
+        return (raw & _MASK).to_bytes(2 * WIDTH, "little")
     if isinstance(raw, float):
         return struct.pack("<d", raw)
-    return blake2b(raw if isinstance(raw, bytes) else raw.encode(), digest_size=WIDTH).digest()
+    return blake2b(raw if isinstance(raw, bytes) else raw.encode(), digest_size=2 * WIDTH).digest()
+
+
+def _narrow(raw: Raw) -> bool:
+    return isinstance(raw, int) and raw in _NARROW

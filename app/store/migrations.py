@@ -86,8 +86,11 @@ STEPS: Final[tuple[tuple[str, ...], ...]] = (
         "CREATE TABLE set_layouts (id INTEGER PRIMARY KEY NOT NULL, addresses TEXT NOT NULL UNIQUE) STRICT",
         """CREATE TABLE set_contents (
             hash TEXT PRIMARY KEY NOT NULL, description_id TEXT NOT NULL, description_version TEXT NOT NULL,
-            identity TEXT NOT NULL, content TEXT NOT NULL, layout INTEGER NOT NULL REFERENCES set_layouts (id),
-            vector BLOB NOT NULL
+            identity TEXT NOT NULL, size INTEGER NOT NULL, content TEXT NOT NULL
+        ) STRICT""",
+        """CREATE TABLE set_vectors (
+            hash TEXT PRIMARY KEY NOT NULL REFERENCES set_contents (hash),
+            layout INTEGER NOT NULL REFERENCES set_layouts (id), vector BLOB NOT NULL
         ) STRICT""",
         """CREATE TABLE set_records (
             id TEXT PRIMARY KEY NOT NULL, hash TEXT NOT NULL REFERENCES set_contents (hash), turbine TEXT NOT NULL,
@@ -115,7 +118,7 @@ STEPS: Final[tuple[tuple[str, ...], ...]] = (
         *(
             f"""CREATE TRIGGER {table}_never_{doing.lower()} BEFORE {doing} ON {table}
             BEGIN SELECT RAISE(ABORT, 'rows of {table} are kept as they are'); END"""
-            for table in ("set_contents", "set_records", "set_tags", "nameplates")
+            for table in ("set_contents", "set_vectors", "set_records", "set_tags", "nameplates")
             for doing in ("UPDATE", "DELETE")
         ),
     ),

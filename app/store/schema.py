@@ -189,11 +189,19 @@ set_contents = Table(
     Column("description_id", Text, nullable=False),
     Column("description_version", Text, nullable=False),
     Column("identity", Text, nullable=False),
+    Column("size", Integer, nullable=False),
     Column("content", Text, nullable=False),
+)
+"""``hash`` is the SHA-256 of ``content`` (``ParameterSet.content``); ``size`` is the number of its values."""
+
+set_vectors = Table(
+    "set_vectors",
+    metadata,
+    Column("hash", Text, ForeignKey("set_contents.hash"), primary_key=True),
     Column("layout", Integer, ForeignKey("set_layouts.id"), nullable=False),
     Column("vector", LargeBinary, nullable=False),
 )
-"""``hash`` is the SHA-256 of ``content`` (``ParameterSet.content``); ``vector`` holds its values (``set_vector``)."""
+"""The values of a content as words (``model.set_vector``), apart from its text: thousands are read at once."""
 
 set_records = Table(
     "set_records",

@@ -19,7 +19,7 @@ from app.model.address import parse_address
 from app.model.set_record import SetRecord, Source, Tag, TagEntry
 from app.model.set_vector import layout_of, pack
 from app.model.sets import Identity, Origin, ParameterSet, iso_time, parse_content
-from app.store.schema import nameplates, set_contents, set_layouts, set_records, set_tags
+from app.store.schema import nameplates, set_contents, set_layouts, set_records, set_tags, set_vectors
 from app.store.schema import set_files as files
 
 _SHORTEST_HASH = 8
@@ -235,11 +235,12 @@ def _put_content(connection: Connection, digest: str, parameters: ParameterSet) 
             "description_id": parameters.description_id,
             "description_version": parameters.description_version,
             "identity": _json(parameters.identity.as_json()),
+            "size": len(parameters.values),
             "content": parameters.content,
-            "layout": _layout_id(connection, layout),
-            "vector": pack(parameters.values, layout),
         },
     )
+    vector = {"hash": digest, "layout": _layout_id(connection, layout), "vector": pack(parameters.values, layout)}
+    connection.execute(insert(set_vectors), vector)
 
 
 def _layout_id(connection: Connection, layout: Iterable[str]) -> int:
@@ -258,7 +259,7 @@ def _records() -> Select[Any]:
         set_contents.c.description_id,
         set_contents.c.description_version,
         set_contents.c.identity,
-        func.length(set_contents.c.vector).label("octets"),
+        set_contents.c.size,
     ).join(set_contents, set_contents.c.hash == set_records.c.hash)
 
 
@@ -276,7 +277,7 @@ def _record(row: Row[Any]) -> SetRecord:
         origin=origin,
         t_ns=row.t_ns,
         source=Source(row.source),
-        values=row.octets // 8,
+        values=row.size,
         unread=len(unread),
         empty=len(json.loads(row.empty)),
     )

@@ -10,7 +10,7 @@ from typing import Final
 from app.model.address import Address
 from app.model.datatypes import Raw
 from app.model.description import Description, Entry, Quantity, QuantityRule
-from app.model.set_vector import word
+from app.model.set_vector import exact
 from app.model.values import quantity_of, show, to_scaled
 
 NO_SUCH_OBJECT: Final = frozenset({"abort 06020000h", "abort 06090011h"})
@@ -110,7 +110,7 @@ class Column:
     def key(self, address: Address) -> str | bytes:
         """Equal where two values at ``address`` are equal."""
         raw = self.values[address]
-        return raw if isinstance(raw, str | bytes) else word(raw)
+        return raw if isinstance(raw, str | bytes) else exact(raw)
 
 
 @dataclass(frozen=True, slots=True)
