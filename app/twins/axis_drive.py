@@ -114,6 +114,8 @@ class AxisDrive:
     def feedback(self, feedback: Feedback) -> None:
         if feedback is not self._feedback:
             self._feedback = feedback
+            self.plant.p[k.SPEED_SOURCE] = _SPEED_SOURCES[feedback]
+            self._now = self._read_parameters()
             # The encoders differ: without this the axis would jump.
             self.profile.put(self._controlled_position, self.profile.velocity)
 
@@ -347,7 +349,6 @@ class AxisDrive:
 
     def _choose_encoders(self) -> None:
         p = self.plant.p
-        p[k.SPEED_SOURCE] = _SPEED_SOURCES[self._feedback]
         by_blade = self._by_blade
         p[k.POSITION_SOURCE] = k.BLADE_ENCODER if by_blade else k.MOTOR_ENCODER
         if by_blade:

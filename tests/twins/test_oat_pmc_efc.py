@@ -231,6 +231,22 @@ def test_with_a_dead_motor_encoder_it_goes_by_the_additional_one(rig: BladeRig, 
 
 
 @pytest.mark.rule("L4")
+def test_by_the_additional_encoder_it_runs_smoothly_although_the_gear_has_play() -> None:
+    rig = BladeRig(angle_deg=45.0)
+    rig.blade.axis.encoder_fault = EncoderFault.SINE_COSINE
+    rig.wait_state(State.FAULT)
+    rig.pmc.inputs.efc = False
+    rig.run_until(lambda: rig.angle_deg > 60, 5 * SECOND)
+    seen = []
+    for _ in range(200):
+        rig.master.run(5 * MS)
+        seen.append((rig.get("6044"), abs(rig.get("6077"))))
+    speeds, currents = zip(*seen, strict=True)
+    assert max(speeds) - min(speeds) < 0.02 * max(speeds)
+    assert max(currents) < 500, "it swings between the limits of the current"
+
+
+@pytest.mark.rule("L4")
 def test_with_a_dead_blade_encoder_it_goes_by_that_of_the_motor_whatever_606a_says(rig: BladeRig) -> None:
     rig.put("567A", 8800)
     rig.put("606A", -1)

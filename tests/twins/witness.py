@@ -12,6 +12,7 @@ from collections.abc import Callable
 from math import radians
 from typing import Final
 
+from app.twins.axis_drive import Feedback
 from app.twins.cia402 import Command, Signals, State
 from app.twins.plant import GEAR_RATIO
 from tests.twins.harness import MS
@@ -91,6 +92,8 @@ class Witness:
         """What a write of 6060h may make of 6061h."""
         self.scaling_as_fitted = True
         """Encoders, gears and feed are described as they are; positions mean something."""
+        self.current_follows = True
+        """The current controller is not tuned so high that it swings: the loops above it reach the motor through it."""
         self.taken: list[int] = []
         """All transitions taken."""
         self._machine = rig.pmc.machine
@@ -102,7 +105,7 @@ class Witness:
         self._farthest = (0.0, 0.0)
         self._has_rested = False
         self._peak_since_ns: int | None = None
-        self._settling_until_ns = 0
+        self._settling_until_ns = self._unwinding_until_ns = 0
         self._restarted = self._feathered = False
         self._machine.history.clear()
         setattr(self._machine, "evaluate", self._evaluate)  # noqa: B010 - a method of this one machine
@@ -149,6 +152,10 @@ class Witness:
         assert any(happened(signals) for signals in seen), f"T{number} without its event"
 
     # -- what can be read ---------------------------------------------------------------
+
+    def load_changed(self) -> None:
+        """What pulled is gone, or pulls elsewhere: the controllers have to unwind."""
+        self._unwinding_until_ns = self.rig.line.now_ns + 300 * MS
 
     def parameters_changed(self) -> None:
         """A limit may just have moved: what is beyond it now may only come back."""
@@ -204,13 +211,15 @@ class Witness:
         """Beyond 6080h and 607Fh the motor brakes, whatever pulls."""
         store = self._number
         rpm, torque = store(0x6044), store(0x6077)
-        pushes = rpm * torque > 0 and abs(torque) > _CURRENT_PERMILLE
-        if t_ns >= self._settling_until_ns and pushes:
+        pushes = self.current_follows and rpm * torque > 0 and abs(torque) > _CURRENT_PERMILLE
+        by_motor = self.rig.pmc.drive.feedback is Feedback.MOTOR_ENCODER
+        knows_rpm = self.scaling_as_fitted or by_motor  # the blade encoder tells the motor's speed through 6091h
+        if t_ns >= self._settling_until_ns and pushes and knows_rpm:
             assert abs(rpm) <= store(0x6080) * _SPEED_SHARE + _SPEED_RPM, "6080h"
         units = abs(store(0x606C))
         per_rpm = abs(self.rig.pmc.drive.scaling.units_per_rad) / 9.549
         allowed = max(store(0x607F), self._fastest) + store(0x60FB, 1) * abs(store(0x60F4)) + _SPEED_RPM * per_rpm
-        if pushes and not self._machine.feathering and self.scaling_as_fitted:
+        if t_ns >= self._unwinding_until_ns and pushes and not self._machine.feathering and self.scaling_as_fitted:
             assert units <= allowed * _SPEED_SHARE, f"607Fh: {units} above {allowed}"
         self._fastest = min(self._fastest, units)
 
@@ -237,7 +246,8 @@ class Witness:
         angle_deg = self.rig.angle_deg
         limits = drive.plant.constants
         assert limits.low_stop_deg - 0.01 <= angle_deg <= limits.high_stop_deg + 0.01
-        moves = self._state is State.OPERATION_ENABLED and self._mode in (1, 8) and self.scaling_as_fitted
+        obeys = self.scaling_as_fitted and self.current_follows
+        moves = self._state is State.OPERATION_ENABLED and self._mode in (1, 8) and obeys
         if not moves:
             self._has_rested = False
             self._farthest = self._beyond()
