@@ -12,16 +12,16 @@ _STYLE: Final = """
 @page { size: A4; margin: 14mm 12mm; }
 * { box-sizing: border-box; }
 body { margin: 0 auto; padding: 8mm; max-width: 210mm; background: #fff; color: #16202b;
-  font: 9.5pt/1.35 system-ui, "Segoe UI", "DejaVu Sans", sans-serif; }
+  font: 9pt/1.35 system-ui, "Segoe UI", "DejaVu Sans", sans-serif; }
 h1 { font-size: 16pt; margin: 0; } h2 { font-size: 11pt; margin: 5mm 0 1.5mm; break-after: avoid; }
 p.station { font-size: 12pt; margin: 1mm 0 3mm; }
 p.badge { border: 2px solid #8a5a00; color: #6b4600; font-weight: 700; padding: 1.5mm 3mm; }
 p.outcome { border-left: 2mm solid; padding: 2mm 3mm; font-size: 11pt; font-weight: 700; background: #f3f5f7; }
-.new { border-color: #17703a; } .old { border-color: #2a5d9c; } .incomplete { border-color: #b3261e; }
+p.new { border-color: #17703a; } p.old { border-color: #2a5d9c; } p.incomplete { border-color: #b3261e; }
 table { width: 100%; border-collapse: collapse; table-layout: fixed; }
 th, td { text-align: left; vertical-align: top; padding: .7mm 1.2mm; border-bottom: .2mm solid #c9d1d8;
   overflow-wrap: anywhere; white-space: pre-wrap; font-variant-numeric: tabular-nums; }
-thead th { border-bottom: .4mm solid #16202b; font-size: 8pt; }
+thead th { border-bottom: .4mm solid #16202b; font-size: 7.5pt; }
 tbody th { font-weight: 600; } thead { display: table-header-group; } tr { break-inside: avoid; }
 footer { margin-top: 6mm; padding-top: 2mm; border-top: .4mm solid #16202b; font-size: 8pt; overflow-wrap: anywhere; }
 footer p { margin: .8mm 0; }

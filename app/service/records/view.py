@@ -173,7 +173,7 @@ def _written(texts: Texts, slug: str, rows: Sequence[RowRecord]) -> Table:
         for row in rows
     )
     title = texts("record.written", device=visible(slug), count=len(rows))
-    return Table(title, _head(names, texts), lines, (4, 11, 6, 6, 6, 3, 4, 4, 4))
+    return Table(title, _head(names, texts), lines, (5, 11, 5, 5, 5, 4, 8, 7, 8))
 
 
 def _skipped(texts: Texts, slug: str, rows: Sequence[RowRecord]) -> Table:
@@ -188,7 +188,7 @@ def _skipped(texts: Texts, slug: str, rows: Sequence[RowRecord]) -> Table:
         for row in rows
     )
     title = texts("record.skipped", device=visible(slug), count=len(rows))
-    return Table(title, _head(("address", "name", "wanted", "now", "unit", "why"), texts), lines, (4, 11, 6, 6, 3, 14))
+    return Table(title, _head(("address", "name", "wanted", "now", "unit", "why"), texts), lines, (4, 11, 5, 5, 4, 14))
 
 
 def _equal(texts: Texts, slug: str, rows: Sequence[RowRecord]) -> Table:
@@ -243,7 +243,7 @@ def _steps(record: RestoreRecord, texts: Texts) -> Table:
         for number, step in enumerate(record.steps, 1)
     )
     head = _head(("number", "time", "step", "device", "value", "result"), texts)
-    return Table(texts("record.steps"), head, lines, (2, 7, 5, 7, 7, 8))
+    return Table(texts("record.steps"), head, lines, (2, 10, 6, 8, 7, 9))
 
 
 def _object(kind: StepKind, address: str, value: Value | None) -> str:
