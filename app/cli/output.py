@@ -25,11 +25,11 @@ if TYPE_CHECKING:
 class Output:
     """Speaks to the person or to the machine that called."""
 
-    def __init__(self, texts: Texts, as_json: bool, out: TextIO = sys.stdout, err: TextIO = sys.stderr) -> None:
+    def __init__(self, texts: Texts, as_json: bool, out: TextIO | None = None, err: TextIO | None = None) -> None:
         self.texts = texts
         self.as_json = as_json
-        self._out = out
-        self._err = err
+        self._out = out or sys.stdout
+        self._err = err or sys.stderr
         self._open_progress = False
 
     def line(self, text: str) -> None:

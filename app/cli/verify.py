@@ -138,7 +138,9 @@ def _tell(path: Path, checked: Checked, output: Output) -> None:
     record = checked.record
     if record is not None:
         said = {"person": record.person, "time": record.ended, "station": record.station, "id": record.id}
-        who = {name: visible(text) for name, text in said.items()}  # it may hold what a terminal obeys
+        who = {
+            name: visible(text).replace("\n", " ") for name, text in said.items()
+        }  # it may hold what a terminal obeys
         output.line("  " + output.texts("cli.verify_who", **who))
         output.line("  " + output.texts(record.outcome.text_key))
         if record.simulated:
