@@ -4,7 +4,31 @@ from __future__ import annotations
 
 from typing import Final
 
-from app.model.rules import dc_link
+from app.model.rules import (
+    axis,
+    battery,
+    charger,
+    dc_link,
+    encoder,
+    mains,
+    mirrors,
+    monitoring,
+    motor,
+    outputs,
+    temperatures,
+)
 from app.model.rules.rule import Rule
 
-ALL: Final[tuple[Rule, ...]] = (*dc_link.RULES,)
+ALL: Final[tuple[Rule, ...]] = (
+    *dc_link.RULES,
+    *mains.RULES,
+    *battery.RULES,
+    *charger.RULES,
+    *axis.RULES,
+    *motor.RULES,
+    *encoder.RULES,
+    *monitoring.RULES,
+    *temperatures.RULES,
+    *outputs.RULES,
+    *mirrors.RULES,
+)

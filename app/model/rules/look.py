@@ -22,14 +22,14 @@ class Object:
     address: str
 
 
-def pmm(*addresses: str) -> tuple[Object, ...]:
-    """Objects of the PMM."""
-    return tuple(Object(PMM, one) for one in addresses)
+def pmm(address: str) -> Object:
+    """An object of the PMM."""
+    return Object(PMM, address)
 
 
-def pmc(*addresses: str) -> tuple[Object, ...]:
-    """Objects of the PMC."""
-    return tuple(Object(PMC, one) for one in addresses)
+def pmc(address: str) -> Object:
+    """An object of the PMC."""
+    return Object(PMC, address)
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,8 +60,12 @@ class Look:
         device = self._station.of_kind(one.description_id)
         raw = None if device is None else device.number(parse_address(one.address))
         if raw is None:
-            self.missing[one] = None
+            self.lacks(one)
         return raw
+
+    def lacks(self, one: Object) -> None:
+        """Note that nothing can be said of the object, also where it holds a number that says nothing."""
+        self.missing[one] = None
 
     def place(self, one: Object) -> Place | None:
         """Where the object stands, None where no such device is there."""
@@ -75,8 +79,25 @@ class Look:
     def told(self, one: Object) -> str:
         """A missing object in words: its address, or its device where that is not there at all."""
         if self._station.of_kind(one.description_id) is None:
-            return one.description_id.replace("-", " ").upper()
+            return device_name(one)
         return parse_address(one.address).short
+
+    def at_default(self, objects: Iterable[Object]) -> str:
+        """Addresses of those that hold the default of the description: what is wrong was never set."""
+        held = (one for one in objects if self._holds_default(one))
+        return ", ".join(parse_address(one.address).short for one in held)
+
+    def _holds_default(self, one: Object) -> bool:
+        device, address = self._station.of_kind(one.description_id), parse_address(one.address)
+        entry = None if device is None else device.description.entries.get(address)
+        if device is None or entry is None or entry.default is None:
+            return False
+        return device.values.get(address) == entry.default
+
+
+def device_name(one: Object) -> str:
+    """Short name of the object's device: OAT PMM."""
+    return one.description_id.replace("-", " ").upper()
 
 
 class NotKnownError(Exception):
@@ -110,7 +131,9 @@ def _findings(station: StationValues, rule_id: str, severity: Severity, judge: J
     look = Look(station)
     try:
         for found in judge(look):
-            yield Finding(rule_id, severity, Verdict.BROKEN, look.places(found.objects), found.details)
+            default = look.at_default(found.objects)
+            details = {**found.details, "at_default": default} if default else found.details
+            yield Finding(rule_id, severity, Verdict.BROKEN, look.places(found.objects), details)
     except NotKnownError:
         pass  # what is missing was noted, and is told below
     if look.missing:

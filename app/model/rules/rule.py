@@ -10,6 +10,7 @@ from app.model.station import Place, StationValues
 
 Detail = int | float | str
 """Fills a placeholder of a finding's text."""
+Details = Mapping[str, Detail]
 
 
 class Severity(Enum):
