@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from app.model.rules.check import broken_stepwise, check_station
-from app.model.rules.dc_link import RULES
+from app.model.rules.dc_link import RULES as DC_LINK
 from app.model.rules.look import PMC, PMM
 from app.model.rules.rule import Severity, Verdict
 from app.model.station import StationValues
-from tests.model.rules.stations import device, place, station
+from tests.model.rules.stations import device, healthy, place, station
+
+RULES = DC_LINK[:1]
+"""The ladder of table 19."""
 
 
 def test_the_ladder_holds_as_delivered() -> None:
@@ -19,8 +22,9 @@ def test_a_broken_rung_names_both_places_over_both_devices() -> None:
     (found,) = check_station(station(pmc={"6510:04": 400}), RULES)
     assert (found.verdict, found.severity) == (Verdict.BROKEN, Severity.ERROR)
     assert found.places == (place(PMC, "6510:04"), place(PMM, "30FA:03"))
-    assert found.details == {"lower": "6510:04", "upper": "30FA:03", "lower_v": 400, "upper_v": 400}
-    assert broken_stepwise(station(pmc={"6510:04": 400})) == {("oat.dc_link_ladder", found.places)}
+    names = {"lower": "6510:04", "upper": "30FA:03"}
+    assert found.details == {**names, "lower_v": 400, "upper_v": 400, "at_default": "30FA:03"}
+    assert broken_stepwise(station(pmc={"6510:04": 400}), RULES) == {("oat.dc_link_ladder", found.places)}
 
 
 def test_the_maxima_may_be_equal_but_not_the_wrong_way_round() -> None:
@@ -52,3 +56,19 @@ def test_of_two_partners_none_is_taken() -> None:
 
 def test_a_station_of_other_devices_is_no_matter_of_a_rule() -> None:
     assert check_station(StationValues((device("nanotec-pd4e", slug="a/b/c"),))) == []
+
+
+def test_the_gravest_comes_first_and_what_is_not_checked_last() -> None:
+    found = check_station(healthy(pmm={"30E3": 0, "3062": None}, pmc={"60FB:03": 0xC001}))
+    assert [(one.rule_id, one.verdict) for one in found] == [
+        ("oat.simulation_mode", Verdict.BROKEN),
+        ("oat.limit_switches_crossable", Verdict.BROKEN),
+        ("oat.self_test_off", Verdict.BROKEN),
+        ("oat.nominal_dc_link", Verdict.NOT_CHECKED),
+    ]
+
+
+def test_two_devices_of_a_kind_are_both_judged_where_no_partner_is_asked() -> None:
+    two = StationValues((device(PMC, {"60FB:01": 0}), device(PMC, {"60FB:01": 0}, "wtg-07/blade-2/pmc-b")))
+    slugs = [one.places[0].slug for one in check_station(two) if one.rule_id == "oat.position_gain"]
+    assert slugs == ["wtg-07/blade-2/pmc", "wtg-07/blade-2/pmc-b"]
