@@ -64,7 +64,7 @@ def _refusal(
         return Why.IRREVOCABLE, {}
     misfit = _misfit(device.description, entry, target, options)
     if misfit is not None:
-        return Why.MISFIT, {"error": misfit.code} | {key: str(value) for key, value in misfit.details.items()}
+        return Why.MISFIT, {"error_key": misfit.text_key} | {key: str(value) for key, value in misfit.details.items()}
     if options.selected is not None and Place(device.slug, entry.address) not in options.selected:
         return Why.NOT_SELECTED, {}
     return None, {}

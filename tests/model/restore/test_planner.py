@@ -83,7 +83,7 @@ def test_every_object_of_set_and_device_has_one_row_that_says_what_becomes_of_it
     reasons |= {place(PMM, "3040"): Why.NEVER, place(PMC, "6066"): Why.UNREADABLE, place(PMC, "6073"): Why.MISFIT}
     for where, why in reasons.items():
         assert row(plan, where).why is why, where
-    assert row(plan, place(PMC, "6073")).details["error"] == "limit"
+    assert row(plan, place(PMC, "6073")).details["error_key"] == "error.limit"
     assert not written(plan)
     for one in now.devices:
         addresses = [found.place.address for found in plan.rows if found.place.slug == one.slug]
