@@ -21,6 +21,7 @@ from app.service.office.office import Office
 from app.service.options import Options
 from app.service.poll import Poller
 from app.service.polling import Polling
+from app.service.restore.desk import Desk
 from app.service.site_edit import SiteEditor
 from app.service.sites import Sites
 from app.store.store import Store
@@ -64,6 +65,7 @@ class Bench:
         self.stamper = stamper or Stamper(wall_ns(), monotonic_ns)
         self.journal = journal or Journal(self.stamper, options.person)
         self.office = Office(store or Store.in_memory(), self.journal, self.stamper, options.person)
+        self.restores = Desk(self.office, self.journal, self.stamper)
         self.site_editor = SiteEditor(sites)
         self.polling = Polling(self.office.store)
         self.connection: Connection | None = None
@@ -94,10 +96,11 @@ class Bench:
     async def connect(self, slug: str, person: str, timeout_s: float = CONNECT_TIMEOUT_S) -> Connection:
         """End the connection that there is, and connect to the turbine ``slug``.
 
-        Raises UsageError, DescriptionError, BusOpenError; then nothing is connected.
+        Raises UsageError, DescriptionError, BusOpenError; then nothing is connected. RestoreOpenError: a restore runs.
         """
         turbine = self.sites.turbine(slug)
         descriptions = self.sites.describe(turbine)
+        self.restores.require_idle()
         async with self._changing:
             await self._end(person)
             found = await with_bitrates(turbine, self.options.listen_s)
@@ -112,6 +115,7 @@ class Bench:
 
     def show(self, connection: Connection) -> None:
         """Have ``connection``, which is open, as the one that is served."""
+        connection.gate.blocks = self.restores.blocks
         self.connection = connection
         self.twins = TwinWatch(connection.targets, connection.buses, self.instructor is not None)
         self.epoch += 1
@@ -134,6 +138,7 @@ class Bench:
 
     async def end_visit(self, reason: str, work_order: str, person: str) -> Visit:
         """End the visit with the values as left, and the connection with it. Raises NoVisitError, StoreError."""
+        self.restores.require_idle()
         async with self._changing:
             visits = self.office.visits
             visits.require()
@@ -144,12 +149,17 @@ class Bench:
             return visit
 
     async def disconnect(self, person: str) -> None:
-        """End the connection; the recording is finished. Nothing happens where there is none."""
+        """End the connection; the recording is finished. Nothing happens where there is none.
+
+        Raises RestoreOpenError while a restore runs.
+        """
+        self.restores.require_idle()
         async with self._changing:
             await self._end(person)
 
     async def close(self) -> None:
-        """End the connection at the end of the server, then the office."""
+        """End the connection at the end of the server, then the office. A restore that runs stays open, incomplete."""
+        await self.restores.close()
         await self.disconnect(self.options.person)
         if self.desk is not None:
             await self.desk.close()

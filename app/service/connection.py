@@ -16,6 +16,7 @@ from app.recording.content import RecorderClock
 from app.recording.writer import RecorderStatus
 from app.service.bus_link import BusLink
 from app.service.devices import Target
+from app.service.gate import Blocks, Gate
 from app.service.journal import Journal, Kind
 from app.service.office.foreign_writes import ForeignWrites
 from app.service.options import Options
@@ -31,7 +32,8 @@ class Connection:
     """From ``open`` to ``close``. Use cases take a driver and a target from here; screens read ``live``.
 
     ``descriptions`` by id must hold every description that the turbine's devices name. ``stamper`` and ``journal`` are
-    those of the bench where connections follow one another: then time and journal go on.
+    those of the bench where connections follow one another: then time and journal go on. ``gate.blocks``
+    are the restores that are not finished.
     """
 
     def __init__(
@@ -45,6 +47,7 @@ class Connection:
         journal: Journal | None = None,
     ) -> None:
         self.turbine = turbine
+        self.gate = Gate({bus.name: bus.connection for bus in turbine.buses}, Blocks())
         self.live = LiveState()
         self.stamper = stamper or Stamper(wall_ns(), monotonic_ns)
         self.journal = journal or Journal(self.stamper, options.person)
@@ -138,7 +141,7 @@ class Connection:
             raise UsageError(reason=f"{device.slug}: no description '{device.description_id}'")
         if description.bus is not Bus.CANOPEN:
             raise UsageError(reason=f"{device.slug}: {description.id} is no device of a CAN bus")
-        return Target(device, description, self.live)
+        return Target(device, description, self.live, self.gate)
 
     def _by_node(self, bus: str) -> dict[int, Description]:
         return {t.node: t.description for t in self._targets.values() if t.device.bus == bus}

@@ -8,16 +8,18 @@ from app.model.address import Address
 from app.model.datatypes import Raw, decode_raw
 from app.model.description import Description, Entry
 from app.model.site import Device
+from app.service.gate import OPEN, Gate
 from app.wire.live import LiveState
 
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """One device of the connected turbine."""
+    """One device of the connected turbine. ``gate`` is asked before it is written, saved or restarted."""
 
     device: Device
     description: Description
     live: LiveState
+    gate: Gate = OPEN
 
     @property
     def slug(self) -> str:

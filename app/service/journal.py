@@ -43,11 +43,18 @@ class Kind(Enum):
     SCENARIO_STARTED = "scenario_started"
     SCENARIO_STOPPED = "scenario_stopped"
     SCENARIO_ENDED = "scenario_ended"
+    RESTORE_BEGUN = "restore_begun"
+    RESTORE_CONFIRMED = "restore_confirmed"
+    RESTORE_TURNED_BACK = "restore_turned_back"
+    RESTORE_RESUMED = "restore_resumed"
+    RESTORE_DONE = "restore_done"
+    RESTORE_ROLLED_BACK = "restore_rolled_back"
+    RESTORE_INCOMPLETE = "restore_incomplete"
 
     @property
     def severity(self) -> Severity:
         """Errors are what was lost or failed; a warning changes what the tool may do."""
-        if self in (Kind.BUS_LOST, Kind.WRITE_FAILED, Kind.RECORDING_LOST, Kind.STORE_FAILED):
+        if self in _ERRORS:
             return Severity.ERROR
         return Severity.WARNING if self in _WARNINGS else Severity.INFO
 
@@ -57,7 +64,18 @@ class Kind(Enum):
         return self in _DONE
 
 
+_ERRORS: Final = (
+    Kind.BUS_LOST,
+    Kind.WRITE_FAILED,
+    Kind.RECORDING_LOST,
+    Kind.STORE_FAILED,
+    Kind.RESTORE_INCOMPLETE,
+)
 _WARNINGS: Final = (
+    Kind.RESTORE_BEGUN,
+    Kind.RESTORE_TURNED_BACK,
+    Kind.RESTORE_RESUMED,
+    Kind.RESTORE_ROLLED_BACK,
     Kind.OTHER_MASTER,
     Kind.CONSENT,
     Kind.RECORDING_STOPPED,
@@ -69,6 +87,10 @@ _WARNINGS: Final = (
     Kind.SCENARIO_STARTED,
 )
 _DONE: Final = (
+    Kind.RESTORE_BEGUN,
+    Kind.RESTORE_CONFIRMED,
+    Kind.RESTORE_TURNED_BACK,
+    Kind.RESTORE_RESUMED,
     Kind.CONNECTED,
     Kind.DISCONNECTED,
     Kind.CONSENT,

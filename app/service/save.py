@@ -37,6 +37,7 @@ async def save(
 
     Raises SdoAbortError, NoAnswerError or UnverifiedError; then nothing is known of the non-volatile memory.
     """
+    target.gate.check(target.device)
     command = save_command(target, category)
     data = encode_raw(DataType.UNSIGNED32, command.signature)
     started_ns = now_ns()
@@ -50,6 +51,7 @@ async def restart(
     driver: Driver, target: Target, journal: Journal, now_ns: Callable[[], int], timeout_s: float = 15.0
 ) -> Took:
     """Restart the device (NMT reset node) and wait for its boot-up message. Raises NoAnswerError."""
+    target.gate.check(target.device)
     started_ns = now_ns()
     journal.note(Kind.RESTART, target.slug)
     await driver.restart(target.node, timeout_s)

@@ -101,6 +101,7 @@ def _check_all(rows: Sequence[tuple[Change, JobRow]], allow: Allow) -> None:
             return target.lookup(address) if found is None else found
 
         try:
+            target.gate.check(target.device)
             check_write(target.description, target.entry(change.address), change.raw, lookup, allow=allow)
         except HubsideError as error:
             row.state, row.error = RowState.REFUSED, error

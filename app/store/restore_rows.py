@@ -41,6 +41,11 @@ class RestoreState(Enum):
         """True where the station holds the new values or the old ones: nothing is blocked any more."""
         return self in (RestoreState.DONE, RestoreState.ROLLED_BACK)
 
+    @property
+    def text_key(self) -> str:
+        """Key of its word."""
+        return f"restore.state.{self.value}"
+
 
 class Direction(Enum):
     """What a step was done for: the new values, the new values after an interruption, or the old ones."""

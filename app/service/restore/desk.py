@@ -1,0 +1,297 @@
+"""The desk of restores: begins them, has them decided, takes up what an earlier run left, shuts the gate meanwhile."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import time
+from collections.abc import Callable, Coroutine, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+from app.errors import (
+    HubsideError,
+    RestoreChangedError,
+    RestoreOpenError,
+    RestoreRefusedError,
+    RestoreStateError,
+    RestoreUnknownError,
+    StoreError,
+    UsageError,
+)
+from app.model.set_record import SetRecord, Source
+from app.service.connection import Connection
+from app.service.devices import Target
+from app.service.gate import OPEN, Block, Blocks
+from app.service.journal import Journal, Kind
+from app.service.office.office import Office
+from app.service.restore import details as detail
+from app.service.restore.log import Kept, RestoreLog, load, new_row, value_rows
+from app.service.restore.order import Cause, Order, Timing
+from app.service.restore.prepare import Prepared, prepare
+from app.service.restore.steps import Hands
+from app.service.restore.survey import Progress, Survey, targets_of
+from app.service.restore.transaction import End, Terms, Transaction
+from app.store import restore_rows as rows
+from app.store.restore_rows import RestoreRow, RestoreState
+from app.store.uuid7 import Uuid7
+
+REASON_BEFORE: Final = "before a restore"
+REASON_AFTER: Final = "after a restore"
+
+
+@dataclass(slots=True)
+class Running:
+    """A restore that is worked on now."""
+
+    id: str
+    station: str
+    transaction: Transaction
+    task: asyncio.Task[End]
+
+
+class Desk:
+    """The restores of one store. Belongs to the event loop; one restore is worked on at a time.
+
+    ``stamp`` gives t_ns; ``blocks`` is what the gates of connections look at. Raises StoreError.
+    """
+
+    def __init__(
+        self,
+        office: Office,
+        journal: Journal,
+        stamp: Callable[[], int],
+        timing: Timing | None = None,
+        monotonic: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.blocks = Blocks()
+        self.running: Running | None = None
+        self._office = office
+        self._store = office.store
+        self._journal = journal
+        self._stamp = stamp
+        self._timing = timing or Timing()
+        self._monotonic = monotonic
+        self._new_id = Uuid7(stamp)
+        self._open: dict[str, RestoreRow] = {}
+        for row in self._store.call(take_up):
+            self._open[row.id] = row
+        self._shut()
+
+    # -- what there is -----------------------------------------------------------------
+
+    @property
+    def open(self) -> tuple[RestoreRow, ...]:
+        """Restores that have not ended, oldest first: also the one that runs."""
+        return tuple(self._open.values())
+
+    async def latest(self, turbine: str | None = None, limit: int = 100) -> list[RestoreRow]:
+        """Restores, newest first."""
+        return await self._store.run(lambda connection: rows.list_restores(connection, turbine, limit))
+
+    async def get(self, restore_id: str) -> Kept:
+        """One restore. Raises RestoreUnknownError."""
+        found = await load(self._store, restore_id)
+        if found is None:
+            raise RestoreUnknownError(restore=restore_id)
+        return found
+
+    def at_work(self, restore_id: str) -> Transaction | None:
+        """The restore while it is worked on."""
+        running = self.running
+        return running.transaction if running is not None and running.id == restore_id else None
+
+    def require_idle(self) -> None:
+        """Raises RestoreOpenError while a restore runs: the connection is its own."""
+        if self.running is not None:
+            raise RestoreOpenError(station=self.running.station, restore=self.running.id)
+
+    # -- begin --------------------------------------------------------------------------
+
+    async def prepare(self, connection: Connection, order: Order, on_progress: Progress | None = None) -> Prepared:
+        """Plan, and what speaks against it. Reads the devices and writes nothing."""
+        self.require_idle()
+        plates = {slug: plate.serial for slug, plate in self._office.library.nameplates.items()}
+        return await prepare(connection, order, plates, self._open_at(connection, order.station), on_progress)
+
+    async def begin(self, connection: Connection, prepared: Prepared, agreed: str | None = None) -> str:
+        """Begin what was prepared just now; gives the id of the restore, which runs in the background.
+
+        ``agreed``: hash of the plan that the person has looked at. Raises RestoreChangedError where it is another one,
+        RestoreRefusedError where something speaks against it, RestoreOpenError.
+        """
+        self.require_idle()
+        order = prepared.order
+        if agreed is not None and agreed != prepared.hash:
+            raise RestoreChangedError(station=order.station)
+        if prepared.refusals:
+            refusals = [one.as_detail() for one in prepared.refusals]
+            raise RestoreRefusedError(station=order.station, count=len(refusals), refusals=refusals)
+        restore_id = self._new_id()
+        before = await self._keep(prepared.found, REASON_BEFORE, order.person, Source.UNDO)
+        details = detail.details_of(connection, prepared, {one.origin.device: one.id for one in before})
+        row = new_row(restore_id, connection.turbine.slug, order, details, self._stamp())
+        values = value_rows(prepared.goals)
+        await self._store.run(lambda kept: rows.add_restore(kept, row, values))
+        self._open[row.id] = row
+        self._shut()
+        self._journal.by(order.person).note(Kind.RESTORE_BEGUN, None, station=order.station, restore=restore_id)
+        kept = Kept(row, tuple(values), ())
+        transaction = self._transaction(connection, kept, order.person, prepared.targets)
+        transaction.found = prepared.found
+        self._run(kept, transaction, transaction.forward(prepared.plan, order.confirm_s), order.person)
+        return restore_id
+
+    # -- decide -------------------------------------------------------------------------
+
+    def confirm(self, restore_id: str, person: str) -> None:
+        """The person agrees to what stands in RAM. Raises RestoreStateError where that is not awaited any more."""
+        transaction = self.at_work(restore_id)
+        if transaction is None or not transaction.confirm(person):
+            raise self._wrong_state(restore_id)
+        station = self._open[restore_id].station
+        self._journal.by(person).note(Kind.RESTORE_CONFIRMED, None, station=station, restore=restore_id)
+
+    async def roll_back(self, connection: Connection | None, restore_id: str, person: str) -> None:
+        """Back to the old values: at once where it is incomplete, else after the step that runs.
+
+        Raises RestoreUnknownError, RestoreStateError, UsageError where its station is not connected.
+        """
+        transaction = self.at_work(restore_id)
+        if transaction is not None:
+            transaction.turn_back(person)
+            return
+        kept, transaction = await self._take_on(connection, restore_id, person, Kind.RESTORE_TURNED_BACK)
+        self._run(kept, transaction, transaction.back(), person)
+
+    async def resume(self, connection: Connection | None, restore_id: str, person: str) -> None:
+        """On to the new values. Raises RestoreUnknownError, RestoreStateError, UsageError."""
+        kept, transaction = await self._take_on(connection, restore_id, person, Kind.RESTORE_RESUMED)
+        self._run(kept, transaction, transaction.resume(), person)
+
+    async def _take_on(
+        self, connection: Connection | None, restore_id: str, person: str, kind: Kind
+    ) -> tuple[Kept, Transaction]:
+        kept = await self.get(restore_id)
+        if self.running is not None or kept.row.state is not RestoreState.INCOMPLETE:
+            raise self._wrong_state(restore_id, kept.row)
+        if connection is None or connection.turbine.slug != kept.row.turbine:
+            raise UsageError(reason=f"connect to {kept.row.turbine} first: the restore is of {kept.row.station}")
+        slugs = {one["slug"] for one in kept.details["devices"]}
+        targets = tuple(target for target in targets_of(connection, kept.row.station) if target.slug in slugs)
+        if len(targets) != len(slugs):
+            raise UsageError(reason=f"not all devices of the restore are there: {', '.join(sorted(slugs))}")
+        self._journal.by(person).note(kind, None, station=kept.row.station, restore=restore_id)
+        return kept, self._transaction(connection, kept, person, targets)
+
+    def _wrong_state(self, restore_id: str, row: RestoreRow | None = None) -> HubsideError:
+        found = row or self._open.get(restore_id)
+        if found is None:
+            return RestoreUnknownError(restore=restore_id)
+        running = self.at_work(restore_id)
+        state = found.state if running is None else running.state
+        return RestoreStateError(restore=restore_id, state_key=state.text_key)
+
+    # -- run ----------------------------------------------------------------------------
+
+    def _transaction(self, connection: Connection, kept: Kept, person: str, targets: tuple[Target, ...]) -> Transaction:
+        details = kept.details
+        log = RestoreLog(self._store, kept, self._stamp)
+        ungated = {target.slug: replace(target, gate=OPEN) for target in targets}
+        journal = self._journal.by(person)
+        hands = Hands(connection, ungated, log, journal, details["expert"], self._timing, self._monotonic)
+        terms = Terms(
+            goals=kept.goals,
+            modes=details["modes"],
+            saves=frozenset(details["saves"]),
+            restart=details["restart"],
+            expert=details["expert"],
+            person=person,
+            reason=REASON_AFTER,
+            serials={one["slug"]: one["identity"].get("serial") for one in details["devices"]},
+        )
+        return Transaction(hands, log, terms)
+
+    def _run(self, kept: Kept, transaction: Transaction, way: Coroutine[Any, Any, End], person: str) -> None:
+        task = asyncio.create_task(self._watched(kept.row, transaction, way, person))
+        self.running = Running(kept.row.id, kept.row.station, transaction, task)
+
+    async def _watched(
+        self, row: RestoreRow, transaction: Transaction, way: Coroutine[Any, Any, End], person: str
+    ) -> End:
+        end = End.INCOMPLETE
+        try:
+            end = await way
+            return end
+        finally:
+            await asyncio.shield(self._ended(row, transaction, end, person))
+
+    async def _ended(self, row: RestoreRow, transaction: Transaction, end: End, person: str) -> None:
+        """The gate opens only where the station holds the old values or the new ones."""
+        if end is End.INCOMPLETE:
+            self._open[row.id] = replace(row, state=RestoreState.INCOMPLETE)
+        else:
+            self._open.pop(row.id, None)
+        self._shut()
+        self.running = None
+        details = {"station": row.station, "restore": row.id}
+        if transaction.broken is not None:
+            details["cause_key"] = transaction.broken.cause.text_key
+        self._journal.by(person).note(_KIND_OF[end], None, **details)
+        if transaction.found is not None and end is not End.INCOMPLETE:
+            await self._keep(transaction.found, REASON_AFTER, person, Source.BACKUP)
+
+    async def wait(self, restore_id: str) -> End:
+        """Until it is not worked on any more."""
+        running = self.running
+        if running is not None and running.id == restore_id:
+            return await asyncio.shield(running.task)
+        state = (await self.get(restore_id)).row.state
+        return {RestoreState.DONE: End.NEW, RestoreState.ROLLED_BACK: End.OLD}.get(state, End.INCOMPLETE)
+
+    async def close(self) -> None:
+        """End what runs: it stays open, incomplete, for whoever comes next."""
+        running = self.running
+        if running is not None:
+            running.task.cancel()
+            await asyncio.wait([running.task])
+
+    # -- the gate -----------------------------------------------------------------------
+
+    def _shut(self) -> None:
+        self.blocks.put(block_of(row) for row in self._open.values())
+
+    def _open_at(self, connection: Connection, station: str) -> str | None:
+        return next((row.id for row in self._open.values() if row.station == station), None)
+
+    async def _keep(self, found: Survey, reason: str, person: str, source: Source) -> list[SetRecord]:
+        """Sets go to the library; a store that fails holds up no restore."""
+        own = [replace(one, origin=replace(one.origin, reason=reason, person=person)) for one in found.sets.values()]
+        try:
+            return await self._office.library.put(own, source)
+        except StoreError:
+            return []
+
+
+_KIND_OF: Final[Mapping[End, Kind]] = {
+    End.NEW: Kind.RESTORE_DONE,
+    End.OLD: Kind.RESTORE_ROLLED_BACK,
+    End.INCOMPLETE: Kind.RESTORE_INCOMPLETE,
+}
+
+
+def take_up(connection: Any) -> list[RestoreRow]:
+    """What an earlier run left open is incomplete from now on: its tool ended, and its deadline with it."""
+    found = []
+    for row in rows.open_restores(connection):
+        if row.state is not RestoreState.INCOMPLETE:
+            outcome = {**json.loads(row.outcome), "cause": Cause.TOOL_ENDED.value, "in_state": row.state.value}
+            rows.put_state(connection, row.id, RestoreState.INCOMPLETE, json.dumps(outcome))
+        found.append(replace(row, state=RestoreState.INCOMPLETE))
+    return found
+
+
+def block_of(row: RestoreRow) -> Block:
+    """What an open restore blocks."""
+    devices = json.loads(row.details)["devices"]
+    return Block(row.id, row.station, frozenset((one["adapter"], one["node"]) for one in devices))

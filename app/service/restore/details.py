@@ -1,0 +1,80 @@
+"""What is kept of an order with its restore, as JSON: enough to go on with it, and to tell of it years later."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from app.model.datatypes import Raw
+from app.model.restore.plan import Plan, StepKind, Treatment
+from app.model.rules.rule import Finding
+from app.service.connection import Connection
+from app.service.gate import adapter_of
+from app.service.restore.prepare import Prepared
+
+
+def details_of(connection: Connection, prepared: Prepared, before: Mapping[str, str]) -> dict[str, Any]:
+    """The document. ``before``: ids of the records with the values before, by slug."""
+    order, plan = prepared.order, prepared.plan
+    adapters = {bus.name: adapter_of(bus.connection) for bus in connection.turbine.buses}
+    devices = []
+    for target in prepared.targets:
+        slug, found = target.slug, prepared.found.sets[target.slug]
+        given = order.given.get(slug)
+        devices.append(
+            {
+                "slug": slug,
+                "adapter": adapters.get(target.device.bus, ""),
+                "node": target.node,
+                "description": [target.description.id, target.description.version],
+                "identity": found.identity.as_json(),
+                "before": {"hash": found.hash, "record": before.get(slug, "")},
+                "set": None if given is None else {"hash": given.parameters.hash, "record": given.record},
+                "same_unit": prepared.same_unit.get(slug),
+            }
+        )
+    return {
+        "devices": devices,
+        "restart": order.restart,
+        "expert": order.expert,
+        "confirm_s": order.confirm_s,
+        "others_confirmed": order.others_confirmed,
+        "plan_hash": prepared.hash,
+        "modes": {slug: one.mode for slug, one in prepared.found.states.items() if one.mode},
+        "saves": [step.device for step in plan.steps if step.kind is StepKind.SAVE],
+        "needs": {slug: [need.value for need in needs] for slug, needs in plan.needs.items()},
+        "after_restart": list(plan.restarts),
+        "skipped": _skipped(plan),
+        "writes": [[row.place.slug, str(row.place.address)] for row in plan.rows if row.treatment is Treatment.WRITE],
+        "findings": [_finding(one) for one in plan.findings],
+    }
+
+
+def _skipped(plan: Plan) -> list[dict[str, Any]]:
+    return [
+        {
+            "device": row.place.slug,
+            "address": str(row.place.address),
+            "why": row.why.value,
+            "details": dict(row.details),
+            "now": plain(row.now),
+            "wanted": plain(row.wanted),
+        }
+        for row in plan.rows
+        if row.why is not None
+    ]
+
+
+def _finding(finding: Finding) -> dict[str, Any]:
+    return {
+        "rule": finding.rule_id,
+        "severity": finding.severity.value,
+        "verdict": finding.verdict.value,
+        "places": [[place.slug, str(place.address)] for place in finding.places],
+        "details": dict(finding.details),
+    }
+
+
+def plain(raw: Raw | None) -> Any:
+    """A raw value as JSON."""
+    return {"hex": raw.hex()} if isinstance(raw, bytes) else raw

@@ -1,0 +1,188 @@
+"""What must hold before the first write. Each reason against a restore is named; none is repaired here."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from decimal import Decimal
+from typing import Final
+
+from app.errors import DeviceError, NoAnswerError
+from app.model.address import Address
+from app.model.datatypes import Raw
+from app.model.restore.plan import Plan, StepKind
+from app.model.sets import Identity, ParameterSet
+from app.model.values import to_scaled
+from app.recording.writer import RecorderState
+from app.service.backup import read_device
+from app.service.connection import Connection
+from app.service.devices import Target
+from app.service.gate import BARE_TURBINE
+from app.service.restore.order import Given, Objection, Order, Refusal
+from app.service.restore.survey import STATUSWORD, VELOCITY, Survey, stage_on
+
+MASTER_QUIET_NS: Final = 10_000_000_000
+"""A master that was seen within so long is at work."""
+STANDSTILL_DPS: Final = Decimal("0.1")
+"""Up to this speed, in degrees a second, an axis stands."""
+FEATHER_DEG: Final = Decimal(15)
+"""So far before its feather position (567Ah) a blade counts as in feather: it makes no driving moment there."""
+POSITION: Final = Address(0x6064)
+FEATHER: Final = Address(0x567A)
+_SCALING: Final = (Address(0x6092, 1), Address(0x6092, 2))
+PMM_STATUS: Final = Address(0x3000)
+SUPPLY_STATUS: Final = Address(0x3004)
+_BATTERY: Final = 1 << 3
+_MAINS: Final = 1 << 4 | 1 << 5 | 1 << 6 | 1 << 7
+_24_VOLT: Final = 1 << 5 | 1 << 6
+"""Bits of 3000h (manual table 11: battery fault; switch-off counter, under and over voltage, phase) and of 3004h."""
+
+
+def objections_to_plan(plan: Plan) -> Iterator[Refusal]:
+    """What speaks against the plan itself."""
+    for finding in plan.blockers:
+        device = finding.places[0].slug if finding.places else ""
+        yield Refusal(Objection.RULES, device, {"rule": finding.rule_id})
+    if plan.unordered:
+        places = ", ".join(f"{place.slug.rpartition('/')[2]} {place.address.short}" for place in plan.unordered)
+        yield Refusal(Objection.NO_ORDER, "", {"addresses": places})
+    if not any(step.kind is StepKind.WRITE for step in plan.steps) and not plan.unordered:
+        yield Refusal(Objection.NOTHING_TO_DO)
+
+
+def objections_to_sets(order: Order, found: Survey, nameplates: Mapping[str, str | None]) -> Iterator[Refusal]:
+    """What speaks against giving these sets to these devices."""
+    if not order.given:
+        yield Refusal(Objection.NOTHING_GIVEN)
+    for slug, given in order.given.items():
+        now = found.sets.get(slug)
+        if now is not None:
+            yield from _objections_to_set(slug, given, now, nameplates.get(slug))
+
+
+def _objections_to_set(slug: str, given: Given, now: ParameterSet, nameplate: str | None) -> Iterator[Refusal]:
+    old, new = given.parameters, now
+    if old.description_id != new.description_id or _differ(old.identity.device_type, new.identity.device_type):
+        yield Refusal(
+            Objection.OTHER_DEVICE_TYPE,
+            slug,
+            {"set": _kind_of(old), "device": _kind_of(new)},
+        )
+    elif _major(old.description_version) != _major(new.description_version):
+        yield Refusal(Objection.DESCRIPTION, slug, {"set": old.description_version, "device": new.description_version})
+    was, software = old.identity.software, new.identity.software
+    if was is not None and software is not None and _major(was) != _major(software):
+        yield Refusal(Objection.FIRMWARE, slug, {"set": was, "device": software})
+    if is_contradictory(old.identity, new.identity, nameplate):
+        yield Refusal(Objection.IDENTITY, slug, {"set": _who(old.identity), "device": _who(new.identity, nameplate)})
+
+
+def is_same_unit(of_set: Identity, device: Identity, nameplate: str | None) -> bool:
+    """True where it is proven that a set comes from this very device.
+
+    By the serial number that the device tells; where it tells none, by the nameplate that a person typed and confirmed.
+    """
+    if is_contradictory(of_set, device, nameplate):
+        return False
+    if of_set.serial is not None and device.serial is not None:
+        return of_set.serial == device.serial and not _differ(of_set.vendor_id, device.vendor_id)
+    return nameplate is not None and of_set.nameplate == nameplate
+
+
+def is_contradictory(of_set: Identity, device: Identity, nameplate: str | None) -> bool:
+    """True where serial number and nameplate say different things: one was exchanged since, or mistyped."""
+    if of_set.nameplate is None or nameplate is None or of_set.serial is None or device.serial is None:
+        return False
+    return (of_set.nameplate == nameplate) != (of_set.serial == device.serial)
+
+
+def objections_to_state(found: Survey) -> Iterator[Refusal]:
+    """What speaks against writing these devices now."""
+    for report in found.reports:
+        slug, values = report.target.slug, report.values
+        status = values.get(STATUSWORD)
+        if STATUSWORD in report.target.description.entries:
+            yield from _objections_to_drive(report.target, values, status)
+        main, supply = values.get(PMM_STATUS), values.get(SUPPLY_STATUS)
+        if isinstance(main, int) and main & _BATTERY:
+            yield Refusal(Objection.BATTERY, slug, {"status": f"{main:04X}h"})
+        if (isinstance(main, int) and main & _MAINS) or (isinstance(supply, int) and supply & _24_VOLT):
+            yield Refusal(Objection.SUPPLY, slug, {"status": f"{main:04X}h" if isinstance(main, int) else "–"})
+
+
+def _objections_to_drive(target: Target, values: Mapping[Address, Raw], status: Raw | None) -> Iterator[Refusal]:
+    if not isinstance(status, int):
+        yield Refusal(Objection.DRIVE_UNKNOWN, target.slug)
+    elif stage_on(status):
+        yield Refusal(Objection.DRIVE_ENABLED, target.slug, {"status": f"{status:04X}h"})
+    speed = _scaled(target, VELOCITY, values)
+    if speed is not None and abs(speed) > STANDSTILL_DPS:
+        yield Refusal(Objection.DRIVE_MOVING, target.slug, {"speed": f"{speed:.2f}"})
+
+
+def objections_to_surroundings(connection: Connection, now_ns: int) -> Iterator[Refusal]:
+    """What speaks against it on the bus and in the tool."""
+    for link in connection.buses.values():
+        seen = [one for one in link.status.masters if now_ns - one.t_ns < MASTER_QUIET_NS]
+        if seen:
+            yield Refusal(Objection.OTHER_MASTER, "", {"bus": link.status.bus, "seen": seen[0].sign.value})
+    recording = connection.recording
+    if recording is None or recording.status().state is not RecorderState.RECORDING:
+        yield Refusal(Objection.NOT_RECORDING)
+
+
+async def objections_to_other_blades(connection: Connection, station: str) -> list[Refusal]:
+    """Blades that do not stand in feather, or whose position nobody can tell. Raises BusLostError."""
+    found = []
+    for target in _other_axes(connection, station):
+        position = await _degrees_before_feather(connection, target)
+        if position is None or position > FEATHER_DEG:
+            shown = "–" if position is None else f"{position:.2f}"
+            found.append(Refusal(Objection.OTHER_BLADES, target.slug, {"missing": shown}))
+    return found
+
+
+def _other_axes(connection: Connection, station: str) -> Iterable[Target]:
+    blades = {one.slug for one in connection.turbine.stations if one.blade is not None and one.slug != station}
+    if connection.turbine.slug == BARE_TURBINE:
+        blades = set()  # nobody can tell which of the nodes belong to which blade
+    return (
+        target
+        for target in connection.targets
+        if target.slug.rpartition("/")[0] in blades and STATUSWORD in target.description.entries
+    )
+
+
+async def _degrees_before_feather(connection: Connection, target: Target) -> Decimal | None:
+    try:
+        report = await read_device(connection.driver(target), target, (POSITION, FEATHER, *_SCALING))
+    except (NoAnswerError, DeviceError):
+        return None
+    position, feather = _scaled(target, POSITION, report.values), _scaled(target, FEATHER, report.values)
+    return None if position is None or feather is None else feather - position
+
+
+def _scaled(target: Target, address: Address, values: Mapping[Address, Raw]) -> Decimal | None:
+    entry, raw = target.description.entries.get(address), values.get(address)
+    if entry is None or raw is None:
+        return None
+    scaled = to_scaled(entry, raw, values.get)
+    return None if scaled is None else scaled.number
+
+
+def _major(version: str) -> str:
+    return version.strip().partition(".")[0]
+
+
+def _differ(one: object, other: object) -> bool:
+    """True where both are known and differ."""
+    return one is not None and other is not None and one != other
+
+
+def _kind_of(parameters: ParameterSet) -> str:
+    kind = parameters.identity.device_type
+    return parameters.description_id if kind is None else f"{parameters.description_id} ({kind:08X}h)"
+
+
+def _who(identity: Identity, nameplate: str | None = None) -> str:
+    plate = nameplate if nameplate is not None else identity.nameplate
+    return " / ".join(str(one) for one in (identity.serial, plate) if one is not None) or "–"

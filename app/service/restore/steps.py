@@ -1,0 +1,294 @@
+"""How the steps of a restore are carried out: what must hold before each, the step itself, and what proves it."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Callable, Coroutine, Iterable, Mapping
+from typing import Any, Final, TypeVar
+
+from app.drivers.contract import LinkState
+from app.errors import (
+    BusLostError,
+    ConflictError,
+    DeviceError,
+    HubsideError,
+    NoAnswerError,
+    StoreError,
+    UnverifiedError,
+)
+from app.model.address import Address
+from app.model.checks import Allow
+from app.model.datatypes import Raw
+from app.model.description import RestoreClass
+from app.model.restore.plan import Step, StepKind
+from app.model.station import Place, StationValues
+from app.service.backup import read_device
+from app.service.connection import Connection
+from app.service.devices import Target
+from app.service.journal import Journal
+from app.service.restore.log import RestoreLog, raw_text
+from app.service.restore.order import Broken, Cause, Timing
+from app.service.restore.survey import (
+    STANDSTILL,
+    STATUSWORD,
+    VELOCITY,
+    Survey,
+    boots_of,
+    is_driven,
+    read_integer,
+)
+from app.service.save import restart, save
+from app.service.write import write_raw
+from app.store.restore_rows import Direction, StepState
+
+T = TypeVar("T")
+DEVICE_TYPE: Final = Address(0x1000)
+LOOK_S: Final = 0.05
+"""How often is looked whether a device is ready, an axis stands, or a person has decided."""
+
+
+class Hands:
+    """Carries out single steps at one station. Every method raises Broken, and nothing else that is expected.
+
+    ``targets`` by slug pass no gate. ``now`` is what RAM is known to hold; the boots and reconnects of ``look_anew``
+    are those against which a hidden restart or a gap shows.
+    """
+
+    def __init__(
+        self,
+        connection: Connection,
+        targets: Mapping[str, Target],
+        log: RestoreLog,
+        journal: Journal,
+        expert: bool,
+        timing: Timing,
+        monotonic: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.connection = connection
+        self.targets = targets
+        self.now = StationValues(())
+        self.timing = timing
+        self.monotonic = monotonic
+        self._log = log
+        self._journal = journal
+        self._expert = expert
+        self._boots: dict[str, int] = {}
+        self._reconnects = self._all_reconnects()
+
+    def take(self, found: Survey) -> None:
+        """Go on from what was just read."""
+        self.now = found.station
+        self._boots = dict(found.boots)
+        self._reconnects = self._all_reconnects()
+
+    # -- what must hold --------------------------------------------------------------
+
+    async def guard(self) -> None:
+        """Nothing has restarted, no frame is missing, no axis is driven."""
+        self.look_for_restarts()
+        for target in self.targets.values():
+            if await self._is_driven(target):
+                raise Broken(Cause.DRIVE_ENABLED, target.slug)
+
+    def look_for_restarts(self) -> None:
+        """No device has started anew, and the bus was not gone, since ``take``."""
+        for name, link in self.connection.buses.items():
+            status = link.status
+            if status.state is LinkState.LOST or status.reconnects != self._reconnects[name]:
+                raise Broken(Cause.BUS_LOST, "", BusLostError(bus=name, reason=status.reason or "connected again"))
+        for slug, target in self.targets.items():
+            if boots_of(target) != self._boots.get(slug, 0):
+                raise Broken(Cause.DEVICE_RESTARTED, slug)
+
+    async def ready(self) -> None:
+        """Wait until every device answers."""
+        for target in self.targets.values():
+            await self._answers(target)
+
+    async def quiet(self) -> None:
+        """Wait until no axis is driven: one that stands is not written to while it follows something."""
+        until = self.monotonic() + self.timing.quiet_s
+        for target in self.targets.values():
+            while await self._is_driven(target, fresh=True):
+                if self.monotonic() > until:
+                    raise Broken(Cause.DRIVE_ENABLED, target.slug)
+                await asyncio.sleep(LOOK_S)
+
+    async def _still(self) -> None:
+        """Wait until all axes stand: a restart opens the safety chain, and that of another device may drive ours."""
+        until = self.monotonic() + self.timing.quiet_s
+        for target in self.targets.values():
+            while abs(await self._integer(target, VELOCITY) or 0) > STANDSTILL:
+                if self.monotonic() > until:
+                    raise Broken(Cause.DRIVE_ENABLED, target.slug)
+                await asyncio.sleep(LOOK_S)
+
+    async def _integer(self, target: Target, address: Address) -> int | None:
+        try:
+            return await read_integer(self.connection, target, address)
+        except HubsideError as error:
+            raise Broken(cause_of(error), target.slug, error) from error
+
+    async def _is_driven(self, target: Target, fresh: bool = False) -> bool:
+        if STATUSWORD not in target.description.entries:
+            return False
+        view = target.live.value(target.device.bus, target.node, STATUSWORD)
+        young_ns = int(self.timing.status_s * 1e9)
+        if not fresh and view is not None and view.reading is not None and not view.stale:
+            raw = target.lookup(STATUSWORD)
+            if view.reading.age_ns(self.connection.stamper()) < young_ns and isinstance(raw, int):
+                return is_driven(raw)
+        status = await self._integer(target, STATUSWORD)
+        return status is not None and is_driven(status)
+
+    async def _answers(self, target: Target) -> None:
+        until = self.monotonic() + self.timing.ready_s
+        while True:
+            try:
+                await self.connection.driver(target).read(target.node, DEVICE_TYPE)
+            except BusLostError as error:
+                raise Broken(Cause.BUS_LOST, target.slug, error) from error
+            except (NoAnswerError, DeviceError) as error:
+                if self.monotonic() > until:
+                    raise Broken(Cause.NO_ANSWER, target.slug, error) from error
+                await asyncio.sleep(LOOK_S)
+            else:
+                return
+
+    def _all_reconnects(self) -> dict[str, int]:
+        return {name: link.status.reconnects for name, link in self.connection.buses.items()}
+
+    # -- the steps ---------------------------------------------------------------------
+
+    async def write(self, step: Step, direction: Direction) -> None:
+        """One value: intent, write, read back; never twice. ``until`` of the step is waited for."""
+        assert step.place is not None and step.raw is not None  # a step that writes has both
+        place, target = step.place, self.targets[step.device]
+        await self.guard()
+        await self._log.intend(direction, step.kind, step.device, place, step.raw)
+        try:
+            done = await whole(
+                write_raw(
+                    self.connection.driver(target),
+                    target,
+                    place.address,
+                    step.raw,
+                    self._journal,
+                    allow=self._allow(target, place.address),
+                    expected=self.now.raw(place),
+                )
+            )
+            if step.until is not None:
+                await self._shows(target, step.until.address, step.raw)
+        except HubsideError as error:
+            self._log.ended(_state_after(error), error)
+            raise Broken(cause_of(error), step.device, error) from error
+        self.now = self.now.with_value(place, step.raw)
+        read = None if done.read is None else raw_text(done.read)
+        self._log.ended(StepState.DONE, read=read, how=done.how.value)
+        self.look_for_restarts()
+
+    def _allow(self, target: Target, address: Address) -> Allow:
+        factory = self._expert and target.entry(address).restore is RestoreClass.FACTORY
+        return Allow.FACTORY if factory else Allow.NOTHING
+
+    async def _shows(self, target: Target, address: Address, raw: Raw) -> None:
+        """Wait until an object shows a value. Raises UnverifiedError and what reading raises."""
+        until = self.monotonic() + self.timing.mode_s
+        while (found := await read_integer(self.connection, target, address)) != raw:
+            if self.monotonic() > until:
+                name = target.entry(address).title
+                raise UnverifiedError(
+                    address=address.short, name=name, sent=str(raw), found=str(found), reason="it is not shown"
+                )
+            await asyncio.sleep(LOOK_S)
+        self.now = self.now.with_value(Place(target.slug, address), raw)
+
+    async def check(self, goals: Mapping[Place, Raw]) -> None:
+        """Read all values once more: what is about to be saved is what was verified."""
+        try:
+            for slug, target in self.targets.items():
+                wanted = {place.address: raw for place, raw in goals.items() if place.slug == slug}
+                report = await read_device(self.connection.driver(target), target, wanted)
+                _compare(Cause.CHANGED, slug, wanted, report.values)
+        except HubsideError as error:
+            raise Broken(cause_of(error), "", error) from error
+        self.look_for_restarts()
+
+    async def save(self, slug: str, direction: Direction) -> None:
+        """1010h, and wait until the device is ready again. From its intent on the memory is in doubt."""
+        target = self.targets[slug]
+        await self.guard()
+        await self._log.intend(direction, StepKind.SAVE, slug)
+        try:
+            took = await whole(save(self.connection.driver(target), target, self._journal, self.connection.stamper))
+        except HubsideError as error:
+            self._log.ended(_state_after(error), error)
+            cause = cause_of(error)
+            raise Broken(cause if not cause.allows_rollback else Cause.SAVE_FAILED, slug, error) from error
+        self._log.ended(StepState.DONE, took_s=round(took.took_s, 3))
+        await self._answers(target)
+        self.look_for_restarts()
+
+    async def restart(self, slug: str, direction: Direction) -> None:
+        """NMT reset node, the boot-up message, and the first answer."""
+        target = self.targets[slug]
+        await self._still()
+        self.look_for_restarts()
+        await self._log.intend(direction, StepKind.RESTART, slug)
+        before = boots_of(target)
+        driver, stamper = self.connection.driver(target), self.connection.stamper
+        try:
+            took = await whole(restart(driver, target, self._journal, stamper, self.timing.boot_s))
+        except HubsideError as error:
+            self._log.ended(_state_after(error), error)
+            raise Broken(cause_of(error), slug, error) from error
+        await self._answers(target)
+        self._log.ended(StepState.DONE, took_s=round(took.took_s, 3))
+        self._boots[slug] = max(before + 1, boots_of(target))
+
+    async def prove(self, slug: str, goals: Mapping[Place, Raw], found: Survey, direction: Direction) -> None:
+        """What was read of the device at the end is what it was to hold."""
+        await self._log.intend(direction, StepKind.PROVE, slug)
+        wanted = {place.address: raw for place, raw in goals.items() if place.slug == slug}
+        try:
+            _compare(Cause.PROOF_FAILED, slug, wanted, found.sets[slug].values)
+        except Broken as broken:
+            self._log.ended(StepState.FAILED, differing=broken.details["differing"])
+            raise
+        self._log.ended(StepState.DONE, values=len(wanted))
+
+
+def _compare(cause: Cause, slug: str, wanted: Mapping[Address, Raw], found: Mapping[Address, Raw]) -> None:
+    differing = [address.short for address, raw in wanted.items() if found.get(address) != raw]
+    if differing:
+        raise Broken(cause, slug, differing=", ".join(differing))
+
+
+def cause_of(error: HubsideError) -> Cause:
+    """Why a restore cannot go on after ``error``."""
+    kinds: Iterable[tuple[type[HubsideError], Cause]] = (
+        (BusLostError, Cause.BUS_LOST),
+        (StoreError, Cause.STORE_FAILED),
+        (ConflictError, Cause.CHANGED),
+        (NoAnswerError, Cause.NO_ANSWER),
+        (UnverifiedError, Cause.UNVERIFIED),
+    )
+    return next((cause for kind, cause in kinds if isinstance(error, kind)), Cause.DEVICE_REFUSED)
+
+
+def _state_after(error: HubsideError) -> StepState:
+    """Whether it is known what became of a step that ended with ``error``."""
+    open_ends = (NoAnswerError, UnverifiedError)
+    return StepState.UNKNOWN if isinstance(error, open_ends) else StepState.FAILED
+
+
+async def whole(work: Coroutine[Any, Any, T]) -> T:
+    """Run to its end, which every time-out of a driver brings about, even where the task is cancelled meanwhile."""
+    task = asyncio.ensure_future(work)
+    try:
+        return await asyncio.shield(task)
+    except asyncio.CancelledError:
+        await asyncio.wait([task])
+        raise

@@ -1,0 +1,126 @@
+"""What stands in a station now, read over the wire: values, identities, and what the drives do."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Final
+
+from app.errors import HubsideError, UsageError
+from app.model.address import Address
+from app.model.restore.wanted import DeviceState
+from app.model.sets import ParameterSet
+from app.model.station import StationValues, station_of
+from app.service.backup import ReadReport, read_device, to_set
+from app.service.connection import Connection
+from app.service.devices import Target
+
+STATUSWORD: Final = Address(0x6041)
+MODE_SHOWN: Final = Address(0x6061)
+VELOCITY: Final = Address(0x606C)
+_STAGE_ON: Final = (0x23, 0x27, 0x07)
+"""Switched on, operation enabled, quick stop active (manual table 49): the output stage is on."""
+_DRIVEN: Final = (0x27, 0x07)
+STANDSTILL: Final = 10
+"""Velocity in position units a second up to which an axis stands: 0.1 degrees a second as delivered."""
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Survey:
+    """One station at one instant. ``boots`` counts the starts of each device that were seen, by slug."""
+
+    reports: tuple[ReadReport, ...]
+    sets: Mapping[str, ParameterSet]
+    station: StationValues
+    states: Mapping[str, DeviceState]
+    boots: Mapping[str, int]
+
+
+async def survey(
+    connection: Connection, targets: Iterable[Target], person: str, reason: str, on_progress: Progress | None = None
+) -> Survey:
+    """Read all devices of a station completely, one at a time on each bus node.
+
+    Raises BusLostError, ConsentError, and NoAnswerError or what else kept a device from telling anything.
+    """
+    targets = tuple(targets)
+    boots = {target.slug: boots_of(target) for target in targets}
+    done = dict.fromkeys((target.slug for target in targets), (0, 0))
+
+    def progress(target: Target, count: int, total: int) -> None:
+        done[target.slug] = count, total
+        if on_progress is not None:
+            on_progress(sum(one for one, _ in done.values()), sum(one for _, one in done.values()))
+
+    reading = (read_device(connection.driver(target), target, None, progress) for target in targets)
+    reports = tuple(await asyncio.gather(*reading))
+    for report in reports:
+        _raise_where_dead(report)
+    turbine, wall_ns = connection.turbine.slug, connection.stamper()
+    sets = {one.target.slug: to_set(one, turbine, person, reason, wall_ns) for one in reports}
+    return Survey(
+        reports,
+        sets,
+        station_of((sets[target.slug], target.description) for target in targets),
+        {report.target.slug: state_of(report) for report in reports},
+        boots,
+    )
+
+
+def _raise_where_dead(report: ReadReport) -> None:
+    if report.lost is not None:
+        raise report.lost
+    if not report.values and report.failed:
+        raise next(iter(report.failed.values()))
+
+
+def state_of(report: ReadReport) -> DeviceState:
+    """What the device does, as far as it has an axis."""
+    status, mode = report.values.get(STATUSWORD), report.values.get(MODE_SHOWN)
+    return DeviceState(
+        mode=mode if isinstance(mode, int) else None,
+        enabled=stage_on(status) if isinstance(status, int) else None,
+    )
+
+
+def stage_on(status: int) -> bool:
+    """True where a statusword says that the output stage is on."""
+    return status & 0x6F in _STAGE_ON or status & 0x4F == 0x0F
+
+
+def is_driven(status: int) -> bool:
+    """True where a statusword says that the axis follows something: set-points, a quick stop, a fault reaction."""
+    return status & 0x6F in _DRIVEN or status & 0x4F == 0x0F
+
+
+def boots_of(target: Target) -> int:
+    """How many starts of a device were seen."""
+    view = target.live.node(target.device.bus, target.node)
+    return 0 if view is None else view.boots
+
+
+def targets_of(connection: Connection, station: str) -> tuple[Target, ...]:
+    """The devices of a station. Raises UsageError."""
+    found = tuple(target for target in connection.targets if target.slug.rpartition("/")[0] == station)
+    if not found:
+        known = ", ".join(dict.fromkeys(target.slug.rpartition("/")[0] for target in connection.targets))
+        raise UsageError(reason=f"no station '{station}'; there are: {known or 'none'}")
+    return found
+
+
+async def read_integer(connection: Connection, target: Target, address: Address) -> int | None:
+    """One object as a number, read now; None where the device does not have it, or refuses it.
+
+    Raises NoAnswerError, BusLostError, ConsentError.
+    """
+    entry = target.description.entries.get(address)
+    if entry is None:
+        return None
+    report = await read_device(connection.driver(target), target, (address,))
+    error: HubsideError | None = report.failed.get(address)
+    if error is not None and error.exit_code != 4:
+        raise error
+    raw = report.values.get(address)
+    return raw if isinstance(raw, int) else None

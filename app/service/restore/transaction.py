@@ -1,0 +1,294 @@
+"""One restore on its way: forward to the new values, back to the old ones, or on after an interruption.
+
+All three are the same: read the station, plan from what is there to the goal, carry the plan out, prove it. What
+differs is the goal, what is saved, and what happens where it fails. The package's docstring has the states.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Final
+
+from app.errors import HubsideError
+from app.model.datatypes import Raw
+from app.model.restore.plan import Plan, Step, StepKind
+from app.model.restore.planner import make_plan
+from app.model.restore.wanted import PlanOptions, Wanted
+from app.model.station import Place
+from app.service.restore.log import RestoreLog, error_document
+from app.service.restore.order import Broken, Cause
+from app.service.restore.steps import LOOK_S, Hands, cause_of
+from app.service.restore.survey import Survey, survey
+from app.store.restore_rows import Direction, RestoreState
+
+log = logging.getLogger(__name__)
+
+
+class End(Enum):
+    """What stands in the devices at the end."""
+
+    NEW = "new"
+    OLD = "old"
+    INCOMPLETE = "incomplete"
+
+
+@dataclass(frozen=True, slots=True)
+class Terms:
+    """What was agreed at the beginning. ``modes``: of operation, by slug, as they were; ``saves``: devices to save.
+
+    ``serials``: serial numbers by slug, None where the device told none.
+    """
+
+    goals: Mapping[Place, tuple[Raw, Raw]]
+    modes: Mapping[str, int]
+    saves: frozenset[str]
+    restart: bool
+    expert: bool
+    person: str
+    reason: str
+    serials: Mapping[str, int | None] = field(default_factory=dict)
+
+    def wanted(self, direction: Direction) -> dict[Place, Raw]:
+        """The values that a way leads to."""
+        at = 0 if direction is Direction.BACK else 1
+        return {place: pair[at] for place, pair in self.goals.items()}
+
+
+class Transaction:
+    """A restore that is worked on. One of ``forward``, ``resume`` and ``back`` is run, once.
+
+    ``found`` is what was read last, complete at the end; ``left_s`` is how long the person has to confirm.
+    """
+
+    def __init__(self, hands: Hands, store_log: RestoreLog, terms: Terms, found: Survey | None = None) -> None:
+        self.found = found
+        self.done = self.total = 0
+        self.broken: Broken | None = None
+        self._hands = hands
+        self._log = store_log
+        self._terms = terms
+        self._decided = asyncio.Event()
+        self._confirmed_by: str | None = None
+        self._back_by: str | None = None
+        self._deadline: float | None = None
+
+    # -- for people ------------------------------------------------------------------
+
+    @property
+    def state(self) -> RestoreState:
+        """How it stands."""
+        return self._log.state
+
+    @property
+    def left_s(self) -> float | None:
+        """Seconds until all is rolled back for want of a confirmation; None where none is awaited."""
+        if self._deadline is None or self._log.state is not RestoreState.AWAITING_CONFIRMATION:
+            return None
+        return max(0.0, self._deadline - self._hands.monotonic())
+
+    def confirm(self, person: str) -> bool:
+        """A person agrees to what stands in RAM. False where nothing awaits it, or too late."""
+        if not self.left_s or self._decided.is_set():
+            return False
+        self._confirmed_by = person
+        self._decided.set()
+        return True
+
+    def turn_back(self, person: str) -> None:
+        """A person wants the old values: after the step that runs now."""
+        self._back_by = person
+        self._decided.set()
+
+    # -- the three ways ----------------------------------------------------------------
+
+    async def forward(self, plan: Plan, confirm_s: float | None) -> End:
+        """From a plan that a person has agreed to; what fails is rolled back at once."""
+        assert self.found is not None  # the plan was made of it
+        self._hands.take(self.found)
+        return await self._guarded(self._go(plan.steps, Direction.FORWARD, confirm_s), falls_back=True)
+
+    async def resume(self) -> End:
+        """On to the new values from whatever is there. What fails leaves it incomplete: a person decides again."""
+        return await self._guarded(self._go_on(), falls_back=False)
+
+    async def back(self, cause: Cause | None = None) -> End:
+        """To the old values from whatever is there."""
+        return await self._guarded(self._go_back(cause), falls_back=False)
+
+    async def _guarded(self, way: object, falls_back: bool) -> End:
+        """Whatever happens, the state that is kept in the end tells the truth."""
+        try:
+            return await way  # type: ignore[misc, no-any-return]
+        except Broken as broken:
+            self.broken = broken
+            wanted_back = broken.cause is Cause.CANCELLED
+            if not (falls_back or wanted_back) or not broken.cause.allows_rollback:
+                return await self._incomplete(broken)
+        except asyncio.CancelledError:
+            await asyncio.shield(self._incomplete(Broken(Cause.TOOL_ENDED)))
+            raise
+        except Exception as error:
+            log.exception("a restore failed by a defect")
+            return await self._incomplete(Broken(Cause.DEFECT, "", HubsideError(reason=repr(error))))
+        return await self._guarded(self._go_back(self.broken.cause), falls_back=False)
+
+    async def _incomplete(self, broken: Broken) -> End:
+        self.broken = self.broken or broken
+        outcome = _outcome_of(broken)
+        if self.broken is not broken:
+            outcome["first_cause"] = self.broken.cause.value
+        try:
+            await self._log.enter(RestoreState.INCOMPLETE, **outcome)
+        except Broken:
+            log.exception("the store cannot be written: the restore stays open")
+            self._log.state = RestoreState.INCOMPLETE
+        return End.INCOMPLETE
+
+    async def _go_on(self) -> End:
+        await self._log.enter(RestoreState.WRITING, cause=None, error=None, device=None, first_cause=None)
+        options = self._options(self._terms.saves)
+        plan = await self._plan(Direction.RESUME, options)
+        return await self._go(self._all_steps(plan, Direction.RESUME), Direction.RESUME, None)
+
+    async def _go_back(self, cause: Cause | None) -> End:
+        known = {} if self.broken is None else _outcome_of(self.broken)
+        await self._log.enter(RestoreState.ROLLING_BACK, **known)
+        options = self._options(frozenset(self._log.saves_begun))
+        plan = await self._plan(Direction.BACK, options)
+        return await self._go(self._all_steps(plan, Direction.BACK), Direction.BACK, None)
+
+    async def _plan(self, direction: Direction, options: PlanOptions) -> Plan:
+        """Read the station and plan, once every device answers and no axis is driven."""
+        await self._hands.ready()
+        await self._hands.quiet()
+        found = await self._read()
+        for slug, serial in self._terms.serials.items():
+            if found.sets[slug].identity.serial != serial:
+                raise Broken(Cause.OTHER_DEVICE, slug)
+        self._hands.take(found)
+        return make_plan(found.station, _by_device(self._terms.wanted(direction)), options, found.states)
+
+    def _options(self, saves: frozenset[str]) -> PlanOptions:
+        """For values that stood in these very devices, or were agreed to for them."""
+        slugs = {place.slug for place in self._terms.goals}
+        return PlanOptions(
+            same_unit=dict.fromkeys(slugs, True),
+            expert=self._terms.expert,
+            restart=self._terms.restart,
+            returning=True,
+            leave_modes=self._terms.modes,
+            save=saves,
+            confirm=False,
+        )
+
+    def _all_steps(self, plan: Plan, direction: Direction) -> Sequence[Step]:
+        """The plan, and for better or worse what it found no order for: what stood there must stand there again."""
+        wanted = self._terms.wanted(direction)
+        rest = [Step(StepKind.WRITE, place.slug, place, wanted[place]) for place in plan.unordered]
+        at = next((n for n, step in enumerate(plan.steps) if step.kind in _LAST), len(plan.steps))
+        return (*plan.steps[:at], *rest, *plan.steps[at:])
+
+    # -- one way -------------------------------------------------------------------------
+
+    async def _go(self, steps: Sequence[Step], direction: Direction, confirm_s: float | None) -> End:
+        goals = self._terms.wanted(direction)
+        self.done, self.total = 0, len(steps)
+        checked = False
+        for step in steps:
+            self._look_for_people(direction)
+            if step.kind is StepKind.SAVE and not checked:
+                await self._hands.check(goals)
+                checked = True
+            await self._enter_for(step, direction)
+            await self._do(step, direction, confirm_s)
+            self.done += 1
+        await self._prove(steps, goals, direction)
+        saved = {step.device for step in steps if step.kind is StepKind.SAVE}
+        restarted = {step.device for step in steps if step.kind is StepKind.RESTART}
+        proven = bool(saved) and saved <= restarted
+        back = direction is Direction.BACK
+        await self._log.enter(RestoreState.ROLLED_BACK if back else RestoreState.DONE, proven=proven)
+        return End.OLD if back else End.NEW
+
+    async def _do(self, step: Step, direction: Direction, confirm_s: float | None) -> None:
+        if step.kind in (StepKind.WRITE, StepKind.AUXILIARY):
+            await self._hands.write(step, direction)
+        elif step.kind is StepKind.CONFIRM:
+            await self._confirm(direction, confirm_s)
+        elif step.kind is StepKind.SAVE:
+            await self._hands.save(step.device, direction)
+        elif step.kind is StepKind.RESTART:
+            await self._hands.restart(step.device, direction)
+
+    async def _enter_for(self, step: Step, direction: Direction) -> None:
+        """The state that the step belongs to."""
+        state = _STATE_FOR.get(step.kind)
+        if state is not None and direction is not Direction.BACK and self._log.state is not state:
+            await self._log.enter(state)
+
+    def _look_for_people(self, direction: Direction) -> None:
+        if self._back_by is not None and direction is not Direction.BACK:
+            raise Broken(Cause.CANCELLED, person=self._back_by)
+
+    async def _confirm(self, direction: Direction, confirm_s: float | None) -> None:
+        """Wait for the person, on the monotonic clock; look meanwhile whether a device restarts or the bus goes."""
+        if confirm_s is None:
+            self._confirmed_by = self._terms.person
+        else:
+            self._deadline = self._hands.monotonic() + confirm_s
+            await self._log.enter(RestoreState.AWAITING_CONFIRMATION, confirm_s=confirm_s)
+            while not self._decided.is_set():
+                if not self.left_s:
+                    raise Broken(Cause.NOT_CONFIRMED)
+                self._hands.look_for_restarts()
+                await asyncio.sleep(LOOK_S)
+            self._look_for_people(direction)
+        await self._log.enter(
+            RestoreState.SAVING, confirmed_by=self._confirmed_by, confirmed_ns=self._hands.connection.stamper()
+        )
+
+    async def _prove(self, steps: Sequence[Step], goals: Mapping[Place, Raw], direction: Direction) -> None:
+        """Everything is read again, and every value of the plan must be there."""
+        if direction is not Direction.BACK and self._log.state is not RestoreState.PROVING:
+            await self._log.enter(RestoreState.PROVING)
+        found = await self._read()
+        self._hands.look_for_restarts()
+        for slug in dict.fromkeys(place.slug for place in goals):
+            await self._hands.prove(slug, goals, found, direction)
+        self.found = found
+
+    async def _read(self) -> Survey:
+        terms = self._terms
+        try:
+            return await survey(self._hands.connection, self._hands.targets.values(), terms.person, terms.reason)
+        except HubsideError as error:
+            raise Broken(cause_of(error), "", error) from error
+
+
+_LAST: Final = (StepKind.CONFIRM, StepKind.SAVE, StepKind.RESTART, StepKind.PROVE)
+_STATE_FOR: Final = {
+    StepKind.SAVE: RestoreState.SAVING,
+    StepKind.RESTART: RestoreState.RESTARTING,
+    StepKind.PROVE: RestoreState.PROVING,
+}
+
+
+def _by_device(goals: Mapping[Place, Raw]) -> dict[str, Wanted]:
+    """Values as the planner takes them."""
+    slugs = dict.fromkeys(place.slug for place in goals)
+    return {slug: Wanted({place.address: raw for place, raw in goals.items() if place.slug == slug}) for slug in slugs}
+
+
+def _outcome_of(broken: Broken) -> dict[str, object]:
+    error = None if broken.error is None else error_document(broken.error)
+    details = {name: str(one) for name, one in broken.details.items()}
+    return {
+        "cause": broken.cause.value,
+        "device": broken.device or None,
+        "error": error,
+        "cause_details": details or None,
+    }
