@@ -83,7 +83,10 @@ STEPS: Final[tuple[tuple[str, ...], ...]] = (
         ) STRICT""",
     ),
     (
-        "CREATE TABLE set_layouts (id INTEGER PRIMARY KEY NOT NULL, addresses TEXT NOT NULL UNIQUE) STRICT",
+        """CREATE TABLE set_layouts (
+            id INTEGER PRIMARY KEY NOT NULL, description_id TEXT NOT NULL, description_version TEXT NOT NULL,
+            addresses TEXT NOT NULL, UNIQUE (description_id, description_version, addresses)
+        ) STRICT""",
         """CREATE TABLE set_contents (
             hash TEXT PRIMARY KEY NOT NULL, description_id TEXT NOT NULL, description_version TEXT NOT NULL,
             identity TEXT NOT NULL, size INTEGER NOT NULL, content TEXT NOT NULL
@@ -98,7 +101,7 @@ STEPS: Final[tuple[tuple[str, ...], ...]] = (
             person TEXT NOT NULL, reason TEXT NOT NULL, work_order TEXT NOT NULL, tool TEXT NOT NULL,
             unread TEXT NOT NULL, empty TEXT NOT NULL, source TEXT NOT NULL
         ) STRICT""",
-        "CREATE INDEX set_records_device ON set_records (device, t_ns)",
+        "CREATE INDEX set_records_device ON set_records (device, t_ns, id, hash)",
         "CREATE INDEX set_records_hash ON set_records (hash, device, t_ns)",
         "CREATE INDEX set_records_time ON set_records (t_ns, id)",
         """CREATE TABLE set_tags (

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sqlalchemy import Column, ForeignKey, Integer, LargeBinary, MetaData, Table, Text
+from sqlalchemy import Column, ForeignKey, Integer, LargeBinary, MetaData, Table, Text, UniqueConstraint
 
 metadata = MetaData()
 
@@ -178,9 +178,12 @@ set_layouts = Table(
     "set_layouts",
     metadata,
     Column("id", Integer, primary_key=True),
-    Column("addresses", Text, nullable=False, unique=True),
+    Column("description_id", Text, nullable=False),
+    Column("description_version", Text, nullable=False),
+    Column("addresses", Text, nullable=False),
+    UniqueConstraint("description_id", "description_version", "addresses"),
 )
-"""Addresses in the order of a vector, with blanks between."""
+"""What the words of a vector are: ``addresses`` in their order, with blanks between (``model.set_vector``)."""
 
 set_contents = Table(
     "set_contents",

@@ -239,16 +239,22 @@ def _put_content(connection: Connection, digest: str, parameters: ParameterSet) 
             "content": parameters.content,
         },
     )
-    vector = {"hash": digest, "layout": _layout_id(connection, layout), "vector": pack(parameters.values, layout)}
+    layout_id = _layout_id(connection, parameters, layout)
+    vector = {"hash": digest, "layout": layout_id, "vector": pack(parameters.values, layout)}
     connection.execute(insert(set_vectors), vector)
 
 
-def _layout_id(connection: Connection, layout: Iterable[str]) -> int:
-    text = " ".join(layout)
-    found: int | None = connection.scalar(select(set_layouts.c.id).where(set_layouts.c.addresses == text))
+def _layout_id(connection: Connection, parameters: ParameterSet, layout: Iterable[str]) -> int:
+    values = {
+        "description_id": parameters.description_id,
+        "description_version": parameters.description_version,
+        "addresses": " ".join(layout),
+    }
+    same = [set_layouts.c[name] == value for name, value in values.items()]
+    found: int | None = connection.scalar(select(set_layouts.c.id).where(*same))
     if found is not None:
         return found
-    made = connection.execute(insert(set_layouts), {"addresses": text}).inserted_primary_key
+    made = connection.execute(insert(set_layouts), values).inserted_primary_key
     assert made is not None  # a row of one table has its key
     return int(made[0])
 
