@@ -22,11 +22,11 @@ const LIVE_MS = 2000;
 export const LEAST_COLUMNS = 2;
 export const MOST_COLUMNS = 12;
 
-/** `all`: process values too. What was shown stays until what is asked for now is there. */
-export const compareQuery = (columns: readonly string[], pending: Pending, all: boolean, live: boolean) =>
+/** Parameters only, no process values. What was shown stays until what is asked for now is there. */
+export const compareQuery = (columns: readonly string[], pending: Pending, live: boolean) =>
   queryOptions({
-    queryKey: ["compare", columns, pending, all],
-    queryFn: () => send<ComparisonDoc>("POST", "/api/compare", { columns, pending, all }),
+    queryKey: ["compare", columns, pending],
+    queryFn: () => send<ComparisonDoc>("POST", "/api/compare", { columns, pending }),
     enabled: columns.length >= LEAST_COLUMNS,
     staleTime: 0,
     refetchInterval: (query) => (live && query.state.status === "success" ? LIVE_MS : false),

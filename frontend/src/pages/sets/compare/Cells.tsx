@@ -10,8 +10,8 @@ import { parameterSearch } from "../../../ui/ReadingText";
 import { cellText, type ColumnContext, deltaText, rawText } from "./compared";
 import classes from "./Compare.module.css";
 import type { BitRow, FactsLine } from "./lines";
-import { Mark } from "./marks";
-import { AbsenceText } from "./signs";
+import { type Against, Mark, marksOf } from "./marks";
+import { type Absence, AbsenceText } from "./signs";
 
 interface ValueProps {
   row: RowDoc;
@@ -27,7 +27,7 @@ export function ValueCell({ row, cell, column, mark, reference }: ValueProps) {
   if (cell.state !== "value")
     return (
       <div role="gridcell" data-mark={Mark.Apart}>
-        <AbsenceText why={cell.state} reason={cell.reason} />
+        <AbsenceText why={absenceOf(cell.state, column)} reason={cell.reason} />
       </div>
     );
   const text = cellText(row, column.at, t);
@@ -52,6 +52,10 @@ export function ValueCell({ row, cell, column, mark, reference }: ValueProps) {
   );
 }
 
+/** A description without a default is no set that lacks something. */
+const absenceOf = (state: Absence, { column }: ColumnContext): Absence =>
+  column.kind === "default" && state === "not-in-set" ? "no-default" : state;
+
 /** The cells before the name stay empty in the lines of details. */
 function Blank({ pickable }: { pickable: boolean }) {
   return (
@@ -63,10 +67,11 @@ function Blank({ pickable }: { pickable: boolean }) {
 }
 
 /** One bit of a mask, or one field of bits, in every column. */
-export function BitCells({ line, pickable }: { line: BitRow; pickable: boolean }) {
+export function BitCells({ line, against, pickable }: { line: BitRow; against: Against; pickable: boolean }) {
   const t = useTexts();
   const { bit } = line;
   const name = bit.text_key === null ? t("page.compare.bit_unnamed") : t(bit.text_key);
+  const marks = marksOf(bit.values, against);
   const number = bit.last === bit.bit ? `${bit.bit}` : `${bit.bit}–${bit.last}`;
   return (
     <>
@@ -79,7 +84,7 @@ export function BitCells({ line, pickable }: { line: BitRow; pickable: boolean }
       </div>
       <div role="gridcell">{bit.clamp}</div>
       {bit.values.map((value, at) => (
-        <div key={at} role="gridcell" data-mark={bit.differs ? Mark.Different : Mark.Same}>
+        <div key={at} role="gridcell" data-mark={marks[at]}>
           <BitState value={value} field={bit.last !== bit.bit} />
         </div>
       ))}

@@ -12,7 +12,7 @@ import { type PageSearch, roomSearch } from "../../../frame/search";
 import { useTexts } from "../../../texts/texts";
 import type { Compared } from "./compared";
 import classes from "./Compare.module.css";
-import { Against, Mark, marksOf } from "./marks";
+import { Against, cellMarks, Mark } from "./marks";
 import { moved, withReference } from "./specs";
 import { turbineOf, useColumnTitle } from "./titles";
 
@@ -30,7 +30,9 @@ export function CompareHead({ compared, against, onColumns }: Props) {
   const { columns, rows } = compared.doc;
   const several = new Set(columns.map((one) => turbineOf(one.device))).size > 1;
   const counts = columns.map(
-    (_, at) => rows.filter((row) => marksOf(row.cells, against)[at] === Mark.Different).length,
+    (_, at) =>
+      rows.filter((row) => row.state === "different" && cellMarks(row.cells, against)[at] === Mark.Different)
+        .length,
   );
   return columns.map((column, at) => {
     const { place, source, more } = titleOf(column, several);

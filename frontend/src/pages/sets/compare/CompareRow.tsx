@@ -7,7 +7,7 @@ import type { ColumnContext } from "./compared";
 import classes from "./Compare.module.css";
 import { FindingText } from "./FindingText";
 import type { CompareLine, RowLine, SectionLine } from "./lines";
-import { type Against, marksOf } from "./marks";
+import { Against, cellMarks, Mark } from "./marks";
 import { ClassChip, RowSign } from "./signs";
 
 export interface RowActions {
@@ -69,9 +69,13 @@ export const CompareRow = memo(function CompareRow(props: Props) {
     case "finding":
       return inTable(3, <FindingText rule={line.rule} />);
     case "bit":
-      return inTable(3, <BitCells line={line} pickable={props.tracks.startsWith("40px")} />, {
-        "data-testid": `bit-${line.id}`,
-      });
+      return inTable(
+        3,
+        <BitCells line={line} against={props.against} pickable={props.tracks.startsWith("40px")} />,
+        {
+          "data-testid": `bit-${line.id}`,
+        },
+      );
     case "facts":
       return inTable(
         3,
@@ -101,8 +105,9 @@ function Section({ line, onFold }: { line: SectionLine; onFold: RowActions["onFo
 function Entry({ line, columns, against, picked, actions }: Props & { line: RowLine }) {
   const t = useTexts();
   const { row, title, known } = line.compared;
-  const marks = marksOf(row.cells, against);
-  const reference = row.cells[0]?.raw ?? null;
+  const marks = cellMarks(row.cells, against);
+  const like = against === Against.Reference ? 0 : marks.indexOf(Mark.Same);
+  const reference = row.cells[like]?.raw ?? null;
   const Chevron = line.expanded ? IconChevronDown : IconChevronRight;
   return (
     <>

@@ -6,7 +6,7 @@ import { ROW_SIGNS } from "./signs";
 const STATES: readonly RowState[] = ["different", "same", "unit", "missing", "not-comparable"];
 
 /** What the signs of the rows mean, and the keys. */
-export function Legend() {
+export function Legend({ pickable }: { pickable: boolean }) {
   const t = useTexts();
   return (
     <ul className={classes.legend} aria-label={t("page.compare.legend")}>
@@ -18,7 +18,7 @@ export function Legend() {
           </li>
         );
       })}
-      <li>{t("page.compare.keys")}</li>
+      <li>{t(pickable ? "page.compare.keys_pick" : "page.compare.keys")}</li>
     </ul>
   );
 }

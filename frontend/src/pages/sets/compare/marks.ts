@@ -1,5 +1,6 @@
 /** How a cell stands to the others of its row: beside the reference, or beside what most hold. */
 import type { CellDoc } from "../../../api/compare";
+import type { Raw } from "../../../api/types";
 
 export enum Mark {
   Reference = "reference",
@@ -15,35 +16,39 @@ export enum Against {
   Majority = "majority",
 }
 
-type Cells = readonly CellDoc[];
+/** null: there is no value. */
+type Values = readonly (Raw | null)[];
 
-export function marksOf(cells: Cells, against: Against): Mark[] {
-  return against === Against.Reference ? besideFirst(cells) : besideMost(cells);
-}
+export const marksOf = (values: Values, against: Against): Mark[] =>
+  against === Against.Reference ? besideFirst(values) : besideMost(values);
 
-function besideFirst(cells: Cells): Mark[] {
-  const [first] = cells;
-  return cells.map((cell, at) => {
+export const cellMarks = (cells: readonly CellDoc[], against: Against): Mark[] =>
+  marksOf(
+    cells.map((cell) => (cell.state === "value" ? cell.raw : null)),
+    against,
+  );
+
+function besideFirst(values: Values): Mark[] {
+  const [first = null] = values;
+  return values.map((value, at) => {
     if (at === 0) return Mark.Reference;
-    if (first?.state !== "value" || cell.state !== "value") return Mark.Apart;
-    return cell.raw === first.raw ? Mark.Same : Mark.Different;
+    if (first === null || value === null) return Mark.Apart;
+    return value === first ? Mark.Same : Mark.Different;
   });
 }
 
 /** Two of three agree: the third is the one to look at. Where no value is the most frequent, all differ. */
-function besideMost(cells: Cells): Mark[] {
-  const most = mostFrequent(cells);
-  return cells.map((cell) => {
-    if (cell.state !== "value") return Mark.Apart;
-    return most !== null && cell.raw === most.raw ? Mark.Same : Mark.Different;
+function besideMost(values: Values): Mark[] {
+  const most = mostFrequent(values);
+  return values.map((value) => {
+    if (value === null) return Mark.Apart;
+    return value === most ? Mark.Same : Mark.Different;
   });
 }
 
-function mostFrequent(cells: Cells): { raw: CellDoc["raw"] } | null {
-  const counts = new Map<CellDoc["raw"], number>();
-  for (const { state, raw } of cells) if (state === "value") counts.set(raw, (counts.get(raw) ?? 0) + 1);
-  const ranked = [...counts].toSorted((a, b) => b[1] - a[1]);
-  const [first, second] = ranked;
-  if (!first || second?.[1] === first[1]) return null;
-  return { raw: first[0] };
+function mostFrequent(values: Values): Raw | null {
+  const counts = new Map<Raw, number>();
+  for (const value of values) if (value !== null) counts.set(value, (counts.get(value) ?? 0) + 1);
+  const [first, second] = [...counts].toSorted((a, b) => b[1] - a[1]);
+  return !first || second?.[1] === first[1] ? null : first[0];
 }

@@ -4,6 +4,7 @@ import {
   IconBan,
   IconBuildingFactory2,
   IconCircleDashed,
+  IconCircleDotted,
   IconDatabaseOff,
   IconEqual,
   IconEqualNot,
@@ -43,11 +44,13 @@ const ABSENCES = {
   "not-on-device": IconPlugOff,
   unread: IconEyeOff,
   empty: IconDatabaseOff,
-  "not-comparable": IconRulerOff,
+  "no-default": IconCircleDotted,
 } as const;
 
+export type Absence = keyof typeof ABSENCES;
+
 /** Why there is no value: each reason with a sign and words of its own. */
-export function AbsenceText({ why, reason = "" }: { why: keyof typeof ABSENCES; reason?: string }) {
+export function AbsenceText({ why, reason = "" }: { why: Absence; reason?: string }) {
   const t = useTexts();
   const Icon = ABSENCES[why];
   return (
