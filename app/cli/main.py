@@ -26,6 +26,7 @@ COMMANDS: Final = {
     "twin": ("twin",),
     "bus": ("scan", "read", "write", "save", "restart", "backup", "record"),
     "recordings": ("export", "recover"),
+    "sets": ("sets",),
     "serve": ("serve",),
     "demo": ("demo",),
     "users": ("users",),
