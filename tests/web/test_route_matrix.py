@@ -89,6 +89,14 @@ ROUTES: Final[dict[tuple[str, str], Role]] = {
     ("POST", "/api/motors/{motor_id}/assign"): TECHNICIAN,
     ("DELETE", "/api/motors/{motor_id}"): EXPERT,
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/motor"): TECHNICIAN,
+    # restores
+    ("POST", "/api/live/restore/plan"): TECHNICIAN,
+    ("POST", "/api/live/restore"): TECHNICIAN,
+    ("GET", "/api/live/restores"): VIEWER,
+    ("GET", "/api/live/restores/{restore_id}"): VIEWER,
+    ("POST", "/api/live/restores/{restore_id}/confirm"): TECHNICIAN,
+    ("POST", "/api/live/restores/{restore_id}/roll-back"): TECHNICIAN,
+    ("POST", "/api/live/restores/{restore_id}/resume"): TECHNICIAN,
     # faults in our own twins
     ("GET", "/api/instructor"): VIEWER,
     ("GET", "/api/instructor/catalogue"): VIEWER,
@@ -142,6 +150,7 @@ PLACES: Final = {
     "{user_id}": "0197a000-0000-7000-8000-000000000000",
     "{job_id}": "none",
     "{fault}": "1",
+    "{restore_id}": "0197a000-0000-7000-8000-000000000000",
     "{name}": "none.mcap",
     "{file}": "none.json",
 }

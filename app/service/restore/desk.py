@@ -235,8 +235,9 @@ class Desk:
         self._shut()
         self.running = None
         details = {"station": row.station, "restore": row.id}
-        if transaction.broken is not None:
-            details["cause_key"] = transaction.broken.cause.text_key
+        cause = Cause.CANCELLED if transaction.broken is None else transaction.broken.cause
+        if end is not End.NEW:
+            details["cause_key"] = cause.text_key
         self._journal.by(person).note(_KIND_OF[end], None, **details)
         if transaction.found is not None and end is not End.INCOMPLETE:
             await self._keep(transaction.found, REASON_AFTER, person, Source.BACKUP)

@@ -15,14 +15,10 @@ from app.model.station import Place
 
 @dataclass(frozen=True, slots=True)
 class Given:
-    """The set that one device is to have; ``record`` is its id in the library, empty where it came from a file.
-
-    ``partial``: values of this very set only, such as those of a motor; what else the device holds is not its business.
-    """
+    """The set that one device is to have; ``record`` is its id in the library, empty where it came from a file."""
 
     parameters: ParameterSet
     record: str = ""
-    partial: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +28,7 @@ class Order:
     ``given`` by slug of the device. ``selected``: None takes everything that may be taken. ``confirm_s``: how long the
     person has to confirm before all is rolled back; None: confirmed already. ``others_confirmed``: an expert answers
     for the other blades, which are not in feather. ``accepted``: rules that an expert lets stay broken.
+    ``homeless``: sets that no device of the station is of the kind for.
     """
 
     station: str
@@ -45,6 +42,7 @@ class Order:
     confirm_s: float | None = 300.0
     others_confirmed: bool = False
     accepted: frozenset[str] = frozenset()
+    homeless: tuple[Given, ...] = ()
 
     def options(self, same_unit: Mapping[str, bool]) -> PlanOptions:
         """What the planner needs of it."""
@@ -77,6 +75,7 @@ class Objection(Enum):
 
     NOTHING_GIVEN = "nothing-given"
     NOTHING_TO_DO = "nothing-to-do"
+    NO_DEVICE = "no-device"
     OTHER_DEVICE_TYPE = "other-device-type"
     DESCRIPTION = "description"
     FIRMWARE = "firmware"

@@ -41,7 +41,9 @@ def objections_to_plan(plan: Plan) -> Iterator[Refusal]:
     """What speaks against the plan itself."""
     for finding in plan.blockers:
         device = finding.places[0].slug if finding.places else ""
-        yield Refusal(Objection.RULES, device, {"rule": finding.rule_id})
+        yield Refusal(
+            Objection.RULES, device, {"rule": finding.rule_id, "rule_title_key": f"rule.{finding.rule_id}.title"}
+        )
     if plan.unordered:
         places = ", ".join(f"{place.slug.rpartition('/')[2]} {place.address.short}" for place in plan.unordered)
         yield Refusal(Objection.NO_ORDER, "", {"addresses": places})
@@ -51,7 +53,10 @@ def objections_to_plan(plan: Plan) -> Iterator[Refusal]:
 
 def objections_to_sets(order: Order, found: Survey, nameplates: Mapping[str, str | None]) -> Iterator[Refusal]:
     """What speaks against giving these sets to these devices."""
-    if not order.given:
+    for given in order.homeless:
+        old = given.parameters
+        yield Refusal(Objection.NO_DEVICE, "", {"from": old.origin.device, "set": old.description_id})
+    if not order.given and not order.homeless:
         yield Refusal(Objection.NOTHING_GIVEN)
     for slug, given in order.given.items():
         now = found.sets.get(slug)

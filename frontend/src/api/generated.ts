@@ -656,6 +656,146 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/live/restore": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Begin Restore
+         * @description Read the station once more, and begin, where the plan is still the one that was looked at.
+         */
+        post: operations["begin_restore"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/live/restore/plan": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Plan Restore
+         * @description Read the station, and say what a restore would do and what speaks against it. Nothing is written.
+         */
+        post: operations["plan_restore"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/live/restores": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Restores
+         * @description Restores, newest first; of one turbine where named.
+         */
+        get: operations["restores"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/live/restores/{restore_id}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Restore
+         * @description How a restore stands.
+         */
+        get: operations["restore"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/live/restores/{restore_id}/confirm": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Confirm Restore
+         * @description Agree to what stands in RAM: it is saved then.
+         */
+        post: operations["confirm_restore"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/live/restores/{restore_id}/resume": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Resume Restore
+         * @description On to the new values, from whatever is there.
+         */
+        post: operations["resume_restore"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/live/restores/{restore_id}/roll-back": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Roll Back Restore
+         * @description Back to the old values.
+         */
+        post: operations["roll_back_restore"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/live/stop": {
         parameters: {
             query?: never;
@@ -1064,6 +1204,46 @@ export interface paths {
         get: operations["download_recording"];
         put?: never;
         post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/rules": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Rules
+         * @description All rules.
+         */
+        get: operations["rules"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/rules/check": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Check Rules
+         * @description Judge stations. A column or a device that is not there is named by the problem.
+         */
+        post: operations["check_rules"];
         delete?: never;
         options?: never;
         head?: never;
@@ -3577,6 +3757,406 @@ export interface components {
             took_s: number;
         };
         /**
+         * RestoreDoc
+         * @description A restore with all its values and steps.
+         *
+         *     ``left_s``: how long the person still has to confirm; null where that is not awaited. ``proven``: by a restart;
+         *     where it is false at the end, the values are saved and not yet proven by one. ``done`` of ``total`` steps of the
+         *     way that runs. ``blocks``: writes, saves and restarts of the station are refused. ``can``: what a person may order.
+         */
+        RestoreDoc: {
+            /** Blocks */
+            blocks: boolean;
+            /** Can */
+            can: ("confirm" | "roll-back" | "resume")[];
+            /** Cause Details */
+            cause_details: {
+                [key: string]: string;
+            };
+            /** Cause Device */
+            cause_device: string | null;
+            /** Cause Key */
+            cause_key: string | null;
+            /** Confirm S */
+            confirm_s: number | null;
+            /** Confirmed By */
+            confirmed_by: string | null;
+            /** Done */
+            done: number;
+            /** End */
+            end: ("new" | "old" | "incomplete") | null;
+            /** Ended Ns */
+            ended_ns: number | null;
+            error: components["schemas"]["Failure"] | null;
+            /** Id */
+            id: string;
+            /** Left S */
+            left_s: number | null;
+            /** Person */
+            person: string;
+            /** Proven */
+            proven: boolean;
+            /** Reason */
+            reason: string;
+            /** Restart */
+            restart: boolean;
+            /** Running */
+            running: boolean;
+            /** Started Ns */
+            started_ns: number;
+            /**
+             * State
+             * @enum {string}
+             */
+            state: "writing" | "awaiting-confirmation" | "saving" | "restarting" | "proving" | "done" | "rolling-back" | "rolled-back" | "incomplete";
+            /** Station */
+            station: string;
+            /** Steps */
+            steps: components["schemas"]["RestoreStepDoc"][];
+            /** Total */
+            total: number;
+            /** Turbine */
+            turbine: string;
+            /** Undo */
+            undo: {
+                [key: string]: string;
+            };
+            /** Values */
+            values: components["schemas"]["RestoreValue"][];
+            /** Work Order */
+            work_order: string;
+        };
+        /**
+         * RestoreFinding
+         * @description What a rule says of the station as it will be. The text is ``rule.<rule>.broken`` or ``rule.not_checked``.
+         */
+        RestoreFinding: {
+            /** Details */
+            details: {
+                [key: string]: unknown;
+            };
+            /** Places */
+            places: components["schemas"]["RestorePlace"][];
+            /** Rule */
+            rule: string;
+            /**
+             * Severity
+             * @enum {string}
+             */
+            severity: "error" | "warning" | "note";
+            /**
+             * Verdict
+             * @enum {string}
+             */
+            verdict: "broken" | "not-checked";
+        };
+        /**
+         * RestoreHead
+         * @description One restore in short. ``end`` null: it is worked on. ``cause_key``: why it did not go on.
+         */
+        RestoreHead: {
+            /** Cause Key */
+            cause_key: string | null;
+            /** End */
+            end: ("new" | "old" | "incomplete") | null;
+            /** Ended Ns */
+            ended_ns: number | null;
+            /** Id */
+            id: string;
+            /** Person */
+            person: string;
+            /** Reason */
+            reason: string;
+            /** Started Ns */
+            started_ns: number;
+            /**
+             * State
+             * @enum {string}
+             */
+            state: "writing" | "awaiting-confirmation" | "saving" | "restarting" | "proving" | "done" | "rolling-back" | "rolled-back" | "incomplete";
+            /** Station */
+            station: string;
+            /** Turbine */
+            turbine: string;
+            /** Work Order */
+            work_order: string;
+        };
+        /**
+         * RestorePlace
+         * @description One object of one device.
+         */
+        RestorePlace: {
+            /** Address */
+            address: string;
+            /** Device */
+            device: string;
+        };
+        /**
+         * RestorePlanDoc
+         * @description A plan. It can be begun where nothing is refused; ``hash`` names all that a person agrees to.
+         */
+        RestorePlanDoc: {
+            /** Blockers */
+            blockers: components["schemas"]["RestoreFinding"][];
+            /** Findings */
+            findings: components["schemas"]["RestoreFinding"][];
+            /** Hash */
+            hash: string;
+            /** Needs */
+            needs: {
+                [key: string]: ("axis-disabled" | "homing-mode")[];
+            };
+            /** Refusals */
+            refusals: components["schemas"]["RestoreRefusal"][];
+            /** Restarts */
+            restarts: string[];
+            /** Rows */
+            rows: components["schemas"]["RestorePlanRow"][];
+            /** Sources */
+            sources: components["schemas"]["RestoreSource"][];
+            /** Station */
+            station: string;
+            /** Steps */
+            steps: components["schemas"]["RestorePlanStep"][];
+            /** Unordered */
+            unordered: components["schemas"]["RestorePlace"][];
+        };
+        /**
+         * RestorePlanRequest
+         * @description Which sets (ids of records, or at least 8 digits of a hash) ``station`` is to have; one a device.
+         *
+         *     A set of the same device goes to it, any other to the device of its kind. ``selected`` null takes everything that
+         *     may be taken. ``restart``: a restart of the devices is agreed to. ``accepted``: rules that an expert lets stay
+         *     broken where they are broken already.
+         */
+        RestorePlanRequest: {
+            /**
+             * Accepted
+             * @default []
+             */
+            accepted: string[];
+            /**
+             * Other Blades Confirmed
+             * @default false
+             */
+            other_blades_confirmed: boolean;
+            /**
+             * Restart
+             * @default false
+             */
+            restart: boolean;
+            /** Selected */
+            selected?: components["schemas"]["RestorePlace"][] | null;
+            /** Sets */
+            sets: string[];
+            /** Station */
+            station: string;
+        };
+        /**
+         * RestorePlanRow
+         * @description One object of the set, or of the device. ``why_key`` says why it is not restored, where it is skipped.
+         */
+        RestorePlanRow: {
+            /** Address */
+            address: string;
+            /** Details */
+            details: {
+                [key: string]: string;
+            };
+            /** Device */
+            device: string;
+            /** Group */
+            group: string;
+            /** Name */
+            name: string;
+            /** Now Raw */
+            now_raw: number | string | null;
+            /** Now Shown */
+            now_shown: string | null;
+            /** Restore Class */
+            restore_class: ("copy" | "unit" | "factory" | "never") | null;
+            /**
+             * Treatment
+             * @enum {string}
+             */
+            treatment: "write" | "equal" | "skip";
+            /** Unit */
+            unit: string;
+            /** Wanted Raw */
+            wanted_raw: number | string | null;
+            /** Wanted Shown */
+            wanted_shown: string | null;
+            /** Why */
+            why: string | null;
+            /** Why Key */
+            why_key: string | null;
+        };
+        /**
+         * RestorePlanStep
+         * @description One step; ``device`` is empty for the confirmation.
+         */
+        RestorePlanStep: {
+            /** Address */
+            address: string | null;
+            /** Device */
+            device: string;
+            /**
+             * Kind
+             * @enum {string}
+             */
+            kind: "write" | "auxiliary" | "confirm" | "save" | "restart" | "prove";
+            /** Name */
+            name: string | null;
+            /** Shown */
+            shown: string | null;
+        };
+        /**
+         * RestoreRefusal
+         * @description One reason against it; ``device`` is empty where it is about all.
+         */
+        RestoreRefusal: {
+            /** Code */
+            code: string;
+            /** Details */
+            details: {
+                [key: string]: string;
+            };
+            /** Device */
+            device: string;
+            /** Text Key */
+            text_key: string;
+        };
+        /**
+         * RestoreRequest
+         * @description The same once more, with the hash of the plan that was looked at; another plan is not begun.
+         *
+         *     ``confirm_s``: how long the person has to confirm once all is written; then all is rolled back.
+         */
+        RestoreRequest: {
+            /**
+             * Accepted
+             * @default []
+             */
+            accepted: string[];
+            /**
+             * Confirm S
+             * @default 300
+             */
+            confirm_s: number;
+            /**
+             * Other Blades Confirmed
+             * @default false
+             */
+            other_blades_confirmed: boolean;
+            /** Plan Hash */
+            plan_hash: string;
+            /**
+             * Reason
+             * @default
+             */
+            reason: string;
+            /**
+             * Restart
+             * @default false
+             */
+            restart: boolean;
+            /** Selected */
+            selected?: components["schemas"]["RestorePlace"][] | null;
+            /** Sets */
+            sets: string[];
+            /** Station */
+            station: string;
+            /**
+             * Work Order
+             * @default
+             * @example WO-20417
+             */
+            work_order: string;
+        };
+        /**
+         * RestoreSource
+         * @description The set that a device is to have, and where it comes from.
+         */
+        RestoreSource: {
+            /** Device */
+            device: string;
+            /** From Device */
+            from_device: string;
+            /** Hash */
+            hash: string;
+            /** Person */
+            person: string;
+            /** Record */
+            record: string;
+            /** Same Unit */
+            same_unit: boolean;
+            /** Time */
+            time: string;
+        };
+        /**
+         * RestoreStepDoc
+         * @description One step as it was begun, and what became of it.
+         */
+        RestoreStepDoc: {
+            /** Address */
+            address: string | null;
+            /** Begun Ns */
+            begun_ns: number;
+            /** Device */
+            device: string;
+            /**
+             * Direction
+             * @enum {string}
+             */
+            direction: "forward" | "resume" | "back";
+            /** Ended Ns */
+            ended_ns: number | null;
+            error: components["schemas"]["Failure"] | null;
+            /**
+             * Kind
+             * @enum {string}
+             */
+            kind: "write" | "auxiliary" | "confirm" | "save" | "restart" | "prove";
+            /** N */
+            n: number;
+            /** Shown */
+            shown: string | null;
+            /**
+             * State
+             * @enum {string}
+             */
+            state: "intended" | "done" | "failed" | "unknown";
+        };
+        /**
+         * RestoreValue
+         * @description One object that the restore answers for. ``written``: it was, by the last step that touched it.
+         */
+        RestoreValue: {
+            /** Address */
+            address: string;
+            /** Before Raw */
+            before_raw: number | string;
+            /** Before Shown */
+            before_shown: string;
+            /** Device */
+            device: string;
+            /** Name */
+            name: string;
+            /**
+             * State
+             * @enum {string}
+             */
+            state: "equal" | "waiting" | "intended" | "done" | "failed" | "unknown";
+            /** Unit */
+            unit: string;
+            /** Wanted Raw */
+            wanted_raw: number | string;
+            /** Wanted Shown */
+            wanted_shown: string;
+            /** Written */
+            written: ("wanted" | "before") | null;
+        };
+        /**
          * RotorLine
          * @description Rotor and wind as a twin told them last, at ``t_ns``; all None where nobody tells them.
          *
@@ -3624,6 +4204,107 @@ export interface components {
              * @constant
              */
             v: 1;
+        };
+        /**
+         * RuleDoc
+         * @description One rule. ``objects``: the addresses that it looks at, by description id; ``section`` of the manual.
+         *
+         *     ``stepwise``: it holds after every single write of a restore as well.
+         */
+        RuleDoc: {
+            /** Id */
+            id: string;
+            /** Objects */
+            objects: {
+                [key: string]: string[];
+            };
+            /** Section */
+            section: string;
+            /**
+             * Severity
+             * @enum {string}
+             */
+            severity: "error" | "warning" | "note";
+            /** Stepwise */
+            stepwise: boolean;
+        };
+        /**
+         * RuleFinding
+         * @description What one rule says. Not checked: the text is ``rule.not_checked``. ``details`` fill the text's placeholders.
+         *
+         *     A detail ``at_default`` names objects that hold their default; its text is ``rule.at_default``.
+         */
+        RuleFinding: {
+            /** Details */
+            details: {
+                [key: string]: number | string;
+            };
+            /** Places */
+            places: components["schemas"]["RulePlace"][];
+            /** Rule */
+            rule: string;
+            /**
+             * Severity
+             * @enum {string}
+             */
+            severity: "error" | "warning" | "note";
+            /**
+             * Verdict
+             * @enum {string}
+             */
+            verdict: "broken" | "not-checked";
+        };
+        /**
+         * RuleList
+         * @description All rules, in their order.
+         */
+        RuleList: {
+            /** Rules */
+            rules: components["schemas"]["RuleDoc"][];
+        };
+        /**
+         * RulePlace
+         * @description One object of one device.
+         */
+        RulePlace: {
+            /** Address */
+            address: string;
+            /** Device */
+            device: string;
+        };
+        /**
+         * RulesCheckRequest
+         * @description What to judge: ``columns`` (as of a comparison, such as ``set:…``), else the connected turbine.
+         *
+         *     ``station``: only this one of the turbine. ``pending`` are changes by device and address.
+         * @example {
+         *       "pending": {
+         *         "wtg-07/blade-2/pmm": {
+         *           "30FA:01": 610
+         *         }
+         *       },
+         *       "station": "wtg-07/blade-2"
+         *     }
+         */
+        RulesCheckRequest: {
+            /** Columns */
+            columns?: string[];
+            /** Pending */
+            pending?: {
+                [key: string]: {
+                    [key: string]: number | string;
+                };
+            };
+            /** Station */
+            station?: string | null;
+        };
+        /**
+         * RulesChecked
+         * @description What the rules say of each station that was looked at.
+         */
+        RulesChecked: {
+            /** Stations */
+            stations: components["schemas"]["StationFindings"][];
         };
         /**
          * SaveDone
@@ -4006,6 +4687,18 @@ export interface components {
             slug: string;
             /** Stations */
             stations: components["schemas"]["SiteStationDoc"][];
+        };
+        /**
+         * StationFindings
+         * @description One station: the devices that were judged together, and the findings, the gravest first.
+         */
+        StationFindings: {
+            /** Devices */
+            devices: string[];
+            /** Findings */
+            findings: components["schemas"]["RuleFinding"][];
+            /** Station */
+            station: string;
         };
         /**
          * StationRef
@@ -7193,6 +7886,501 @@ export interface operations {
             };
         };
     };
+    begin_restore: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "confirm_s": 300,
+                 *       "plan_hash": "5f5f5f5f5f5f5f5f5f5f5f5f5f5f5f5f5f5f5f5f5f5f5f5f5f5f5f5f5f5f5f5f",
+                 *       "reason": "motor exchanged",
+                 *       "restart": true,
+                 *       "sets": [
+                 *         "0197a000-0000-7000-8000-000000000001",
+                 *         "0197a000-0000-7000-8000-000000000002"
+                 *       ],
+                 *       "station": "wtg-07/blade-1",
+                 *       "work_order": "WO-20417"
+                 *     }
+                 */
+                "application/json": components["schemas"]["RestoreRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["RestoreDoc"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Conflict */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    plan_restore: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "restart": true,
+                 *       "sets": [
+                 *         "0197a000-0000-7000-8000-000000000001",
+                 *         "0197a000-0000-7000-8000-000000000002"
+                 *       ],
+                 *       "station": "wtg-07/blade-1"
+                 *     }
+                 */
+                "application/json": components["schemas"]["RestorePlanRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["RestorePlanDoc"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Conflict */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    restores: {
+        parameters: {
+            query?: {
+                turbine?: string | null;
+                limit?: number;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["RestoreHead"][];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    restore: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                restore_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["RestoreDoc"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    confirm_restore: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                restore_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /** @example {} */
+                "application/json": components["schemas"]["Nothing"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["RestoreDoc"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    resume_restore: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                restore_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /** @example {} */
+                "application/json": components["schemas"]["Nothing"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["RestoreDoc"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    roll_back_restore: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                restore_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /** @example {} */
+                "application/json": components["schemas"]["Nothing"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["RestoreDoc"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
     stop: {
         parameters: {
             query?: never;
@@ -8615,6 +9803,123 @@ export interface operations {
             };
             /** @description Not Found */
             404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    rules: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["RuleList"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    check_rules: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "pending": {
+                 *         "wtg-07/blade-2/pmm": {
+                 *           "30FA:01": 610
+                 *         }
+                 *       },
+                 *       "station": "wtg-07/blade-2"
+                 *     }
+                 */
+                "application/json": components["schemas"]["RulesCheckRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["RulesChecked"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
                 headers: {
                     [name: string]: unknown;
                 };

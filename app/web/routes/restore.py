@@ -1,0 +1,110 @@
+"""Restores: plan, begin, confirm, roll back, resume, and how they stand."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Query
+
+from app.model.address import parse_address
+from app.model.roles import Role, SignedIn
+from app.model.station import Place
+from app.service.bench import Bench
+from app.service.connection import Connection
+from app.service.restore.assign import assign
+from app.service.restore.order import Given, Order
+from app.service.restore.survey import targets_of
+from app.web.deps import BenchOf, ConnectionOf, PersonOf, needs
+from app.web.models import Nothing
+from app.web.models.restore import RestoreDoc, RestoreHead, RestorePlanDoc, RestorePlanRequest, RestoreRequest
+from app.web.models.restore_docs import descriptions_of, head_doc, plan_doc, restore_doc
+
+router = APIRouter()
+
+
+@router.post("/live/restore/plan", dependencies=[needs(Role.TECHNICIAN)])
+async def plan_restore(
+    bench: BenchOf, connection: ConnectionOf, person: PersonOf, request: RestorePlanRequest
+) -> RestorePlanDoc:
+    """Read the station, and say what a restore would do and what speaks against it. Nothing is written."""
+    order = await _order(bench, connection, person, request)
+    return plan_doc(await bench.restores.prepare(connection, order))
+
+
+@router.post("/live/restore", dependencies=[needs(Role.TECHNICIAN)])
+async def begin_restore(
+    bench: BenchOf, connection: ConnectionOf, person: PersonOf, request: RestoreRequest
+) -> RestoreDoc:
+    """Read the station once more, and begin, where the plan is still the one that was looked at."""
+    order = await _order(bench, connection, person, request)
+    prepared = await bench.restores.prepare(connection, order)
+    return await _doc(bench, await bench.restores.begin(connection, prepared, request.plan_hash))
+
+
+@router.get("/live/restores")
+async def restores(
+    bench: BenchOf,
+    turbine: Annotated[str | None, Query(max_length=200)] = None,
+    limit: Annotated[int, Query(ge=1, le=500)] = 100,
+) -> list[RestoreHead]:
+    """Restores, newest first; of one turbine where named."""
+    return [head_doc(row) for row in await bench.restores.latest(turbine, limit)]
+
+
+@router.get("/live/restores/{restore_id}")
+async def restore(bench: BenchOf, restore_id: str) -> RestoreDoc:
+    """How a restore stands."""
+    return await _doc(bench, restore_id)
+
+
+@router.post("/live/restores/{restore_id}/confirm", dependencies=[needs(Role.TECHNICIAN)])
+async def confirm_restore(bench: BenchOf, person: PersonOf, restore_id: str, _request: Nothing) -> RestoreDoc:
+    """Agree to what stands in RAM: it is saved then."""
+    bench.restores.confirm(restore_id, person.person)
+    return await _doc(bench, restore_id)
+
+
+@router.post("/live/restores/{restore_id}/roll-back", dependencies=[needs(Role.TECHNICIAN)])
+async def roll_back_restore(bench: BenchOf, person: PersonOf, restore_id: str, _request: Nothing) -> RestoreDoc:
+    """Back to the old values."""
+    await bench.restores.roll_back(bench.connection, restore_id, person.person)
+    return await _doc(bench, restore_id)
+
+
+@router.post("/live/restores/{restore_id}/resume", dependencies=[needs(Role.TECHNICIAN)])
+async def resume_restore(bench: BenchOf, person: PersonOf, restore_id: str, _request: Nothing) -> RestoreDoc:
+    """On to the new values, from whatever is there."""
+    await bench.restores.resume(bench.connection, restore_id, person.person)
+    return await _doc(bench, restore_id)
+
+
+async def _order(bench: Bench, connection: Connection, person: SignedIn, request: RestorePlanRequest) -> Order:
+    """What the page asks for. Raises UsageError, SetUnknownError."""
+    library = bench.office.library
+    records = [await library.record(key) for key in request.sets]
+    sets = [Given(await library.set_of(record), record.id) for record in records]
+    given, homeless = assign(targets_of(connection, request.station), sets)
+    chosen = request.selected
+    full = request if isinstance(request, RestoreRequest) else None
+    return Order(
+        station=request.station,
+        given=given,
+        person=person.person,
+        selected=None if chosen is None else frozenset(Place(one.device, parse_address(one.address)) for one in chosen),
+        restart=request.restart,
+        expert=person.role.covers(Role.EXPERT),
+        reason="" if full is None else full.reason,
+        work_order="" if full is None else full.work_order,
+        confirm_s=None if full is None else full.confirm_s,
+        others_confirmed=request.other_blades_confirmed,
+        accepted=frozenset(request.accepted),
+        homeless=homeless,
+    )
+
+
+async def _doc(bench: Bench, restore_id: str) -> RestoreDoc:
+    kept = await bench.restores.get(restore_id)
+    connection = bench.connection
+    targets = () if connection is None else connection.targets
+    connected = {target.slug: target.description for target in targets}
+    return restore_doc(kept, bench.restores, descriptions_of(kept, connected))
