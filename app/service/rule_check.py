@@ -42,7 +42,7 @@ def check_live(targets: Iterable[Target], pending: Pending, station: str | None 
 
     What is not known of a device's RAM now, or was not seen since frames were lost, counts as not known.
     """
-    return _judge(
+    return judge(
         DeviceValues(target.slug, target.description, {**ram_of(target)[0], **pending.get(target.slug, {})})
         for target in targets
         if station in (None, station_slug(target.slug))
@@ -50,11 +50,12 @@ def check_live(targets: Iterable[Target], pending: Pending, station: str | None 
 
 
 def check_sets(sets: Iterable[tuple[ParameterSet, Description]]) -> list[Judged]:
-    """Sets with what describes them. Of several sets of one device the first counts."""
-    return _judge(station_of(sets).devices)
+    """Sets with what describes them; those of one station are judged together."""
+    return judge(station_of(sets).devices)
 
 
-def _judge(devices: Iterable[DeviceValues]) -> list[Judged]:
+def judge(devices: Iterable[DeviceValues]) -> list[Judged]:
+    """Devices by their stations. Of one that comes twice the first counts."""
     stations: dict[str, dict[str, DeviceValues]] = {}
     for one in devices:
         stations.setdefault(station_slug(one.slug), {}).setdefault(one.slug, one)
