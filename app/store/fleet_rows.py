@@ -5,12 +5,32 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, Final
 
-from sqlalchemy import Connection, func, select
+from sqlalchemy import Connection, delete, insert, select
 
-from app.store.schema import set_layouts, set_records, set_vectors
+from app.model.set_vector import layout_of, pack
+from app.model.sets import ParameterSet
+from app.store.schema import set_latest, set_layouts
 
 CHUNK: Final = 128
 """Rows that are handed on at once: a few hundred kilobytes, which stay in the processor's cache."""
+
+
+def keep_latest(connection: Connection, record_id: str, parameters: ParameterSet) -> None:
+    """A record was added: it is the latest of its device, unless a later one is there."""
+    device, t_ns = parameters.origin.device, parameters.origin.t_ns
+    known = connection.scalar(select(set_latest.c.t_ns).where(set_latest.c.device == device))
+    if known is not None and known > t_ns:
+        return
+    layout = layout_of(parameters.values)
+    row = {
+        "device": device,
+        "record_id": record_id,
+        "t_ns": t_ns,
+        "layout": _layout_id(connection, parameters, layout),
+        "vector": pack(parameters.values, layout),
+    }
+    connection.execute(delete(set_latest).where(set_latest.c.device == device))
+    connection.execute(insert(set_latest), row)
 
 
 def layouts_of(connection: Connection, description_id: str) -> dict[int, tuple[str, tuple[str, ...]]]:
@@ -20,18 +40,25 @@ def layouts_of(connection: Connection, description_id: str) -> dict[int, tuple[s
 
 
 def scan_latest(connection: Connection, layouts: Sequence[int], take: Callable[[Sequence[Any]], None]) -> None:
-    """Hand the latest set of every device to ``take``, some rows at a time, where it has one of ``layouts``."""
-    # A bare column beside max() is that of the row with the maximum (SQLite, "SELECT", 2.5).
-    latest = (
-        select(set_records.c.id, set_records.c.device, set_records.c.hash, func.max(set_records.c.t_ns).label("t_ns"))
-        .group_by(set_records.c.device)
-        .subquery()
-    )
-    query = (
-        select(latest.c.id, latest.c.device, latest.c.t_ns, set_vectors.c.layout, set_vectors.c.vector)
-        .join(set_vectors, set_vectors.c.hash == latest.c.hash)
-        .where(set_vectors.c.layout.in_(layouts))
-    )
-    rows = connection.execute(query)
+    """Hand the latest sets that have one of ``layouts`` to ``take``, some rows at a time.
+
+    A row is device, record, t_ns, layout, vector.
+    """
+    rows = connection.execute(select(set_latest).where(set_latest.c.layout.in_(layouts)))
     while chunk := rows.fetchmany(CHUNK):
         take(chunk)
+
+
+def _layout_id(connection: Connection, parameters: ParameterSet, layout: Sequence[str]) -> int:
+    values = {
+        "description_id": parameters.description_id,
+        "description_version": parameters.description_version,
+        "addresses": " ".join(layout),
+    }
+    same = [set_layouts.c[name] == value for name, value in values.items()]
+    found: int | None = connection.scalar(select(set_layouts.c.id).where(*same))
+    if found is not None:
+        return found
+    made = connection.execute(insert(set_layouts), values).inserted_primary_key
+    assert made is not None  # a row of one table has its key
+    return int(made[0])

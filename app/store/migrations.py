@@ -91,19 +91,19 @@ STEPS: Final[tuple[tuple[str, ...], ...]] = (
             hash TEXT PRIMARY KEY NOT NULL, description_id TEXT NOT NULL, description_version TEXT NOT NULL,
             identity TEXT NOT NULL, size INTEGER NOT NULL, content TEXT NOT NULL
         ) STRICT""",
-        """CREATE TABLE set_vectors (
-            hash TEXT PRIMARY KEY NOT NULL REFERENCES set_contents (hash),
-            layout INTEGER NOT NULL REFERENCES set_layouts (id), vector BLOB NOT NULL
-        ) STRICT""",
         """CREATE TABLE set_records (
             id TEXT PRIMARY KEY NOT NULL, hash TEXT NOT NULL REFERENCES set_contents (hash), turbine TEXT NOT NULL,
             station TEXT NOT NULL, device TEXT NOT NULL, node INTEGER NOT NULL, t_ns INTEGER NOT NULL,
             person TEXT NOT NULL, reason TEXT NOT NULL, work_order TEXT NOT NULL, tool TEXT NOT NULL,
             unread TEXT NOT NULL, empty TEXT NOT NULL, source TEXT NOT NULL
         ) STRICT""",
-        "CREATE INDEX set_records_device ON set_records (device, t_ns, id, hash)",
+        "CREATE INDEX set_records_device ON set_records (device, t_ns)",
         "CREATE INDEX set_records_hash ON set_records (hash, device, t_ns)",
         "CREATE INDEX set_records_time ON set_records (t_ns, id)",
+        """CREATE TABLE set_latest (
+            device TEXT PRIMARY KEY NOT NULL, record_id TEXT NOT NULL REFERENCES set_records (id),
+            t_ns INTEGER NOT NULL, layout INTEGER NOT NULL REFERENCES set_layouts (id), vector BLOB NOT NULL
+        ) STRICT""",
         """CREATE TABLE set_tags (
             seq INTEGER PRIMARY KEY NOT NULL, tag TEXT NOT NULL, scope TEXT NOT NULL,
             visit_id TEXT REFERENCES visits (id), record_id TEXT REFERENCES set_records (id), person TEXT NOT NULL,
@@ -121,7 +121,7 @@ STEPS: Final[tuple[tuple[str, ...], ...]] = (
         *(
             f"""CREATE TRIGGER {table}_never_{doing.lower()} BEFORE {doing} ON {table}
             BEGIN SELECT RAISE(ABORT, 'rows of {table} are kept as they are'); END"""
-            for table in ("set_contents", "set_vectors", "set_records", "set_tags", "nameplates")
+            for table in ("set_contents", "set_records", "set_tags", "nameplates")
             for doing in ("UPDATE", "DELETE")
         ),
     ),

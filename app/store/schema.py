@@ -197,15 +197,6 @@ set_contents = Table(
 )
 """``hash`` is the SHA-256 of ``content`` (``ParameterSet.content``); ``size`` is the number of its values."""
 
-set_vectors = Table(
-    "set_vectors",
-    metadata,
-    Column("hash", Text, ForeignKey("set_contents.hash"), primary_key=True),
-    Column("layout", Integer, ForeignKey("set_layouts.id"), nullable=False),
-    Column("vector", LargeBinary, nullable=False),
-)
-"""The values of a content as words (``model.set_vector``), apart from its text: thousands are read at once."""
-
 set_records = Table(
     "set_records",
     metadata,
@@ -225,6 +216,20 @@ set_records = Table(
     Column("source", Text, nullable=False),
 )
 """An occasion on which a content was taken. ``unread`` (address: why) and ``empty`` are JSON."""
+
+set_latest = Table(
+    "set_latest",
+    metadata,
+    Column("device", Text, primary_key=True),
+    Column("record_id", Text, ForeignKey("set_records.id"), nullable=False),
+    Column("t_ns", Integer, nullable=False),
+    Column("layout", Integer, ForeignKey("set_layouts.id"), nullable=False),
+    Column("vector", LargeBinary, nullable=False),
+)
+"""The latest record of each device with its values as words (``model.set_vector``): a fleet is read in one go.
+
+It follows from ``set_records``, and is changed with them.
+"""
 
 set_tags = Table(
     "set_tags",

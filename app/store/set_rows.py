@@ -1,7 +1,7 @@
 """Rows of the library of parameter sets: contents, the occasions on which they were taken, tags and nameplates.
 
-A content is kept once, under the SHA-256 of its canonical text, with its values as a vector (``model.set_vector``), so
-that thousands are compared at once. Nothing is deleted; of tags and nameplates the newest row counts.
+A content is kept once, under the SHA-256 of its canonical text. Nothing is deleted; of tags and nameplates the newest
+row counts.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from sqlalchemy import Row, Select, delete, func, insert, select
 
 from app.model.address import parse_address
 from app.model.set_record import SetRecord, Source, Tag, TagEntry
-from app.model.set_vector import layout_of, pack
 from app.model.sets import Identity, Origin, ParameterSet, iso_time, parse_content
-from app.store.schema import nameplates, set_contents, set_layouts, set_records, set_tags, set_vectors
+from app.store.fleet_rows import keep_latest
+from app.store.schema import nameplates, set_contents, set_records, set_tags
 from app.store.schema import set_files as files
 
 _SHORTEST_HASH = 8
@@ -82,6 +82,7 @@ def put_set(connection: Connection, new_id: str, parameters: ParameterSet, sourc
             "source": source.value,
         },
     )
+    keep_latest(connection, new_id, parameters)
     return _record(connection.execute(_records().where(set_records.c.id == new_id)).one())
 
 
@@ -227,7 +228,6 @@ def forget_files(connection: Connection, names: Iterable[str]) -> None:
 def _put_content(connection: Connection, digest: str, parameters: ParameterSet) -> None:
     if connection.scalar(select(set_contents.c.hash).where(set_contents.c.hash == digest)) is not None:
         return
-    layout = layout_of(parameters.values)
     connection.execute(
         insert(set_contents),
         {
@@ -239,24 +239,6 @@ def _put_content(connection: Connection, digest: str, parameters: ParameterSet) 
             "content": parameters.content,
         },
     )
-    layout_id = _layout_id(connection, parameters, layout)
-    vector = {"hash": digest, "layout": layout_id, "vector": pack(parameters.values, layout)}
-    connection.execute(insert(set_vectors), vector)
-
-
-def _layout_id(connection: Connection, parameters: ParameterSet, layout: Iterable[str]) -> int:
-    values = {
-        "description_id": parameters.description_id,
-        "description_version": parameters.description_version,
-        "addresses": " ".join(layout),
-    }
-    same = [set_layouts.c[name] == value for name, value in values.items()]
-    found: int | None = connection.scalar(select(set_layouts.c.id).where(*same))
-    if found is not None:
-        return found
-    made = connection.execute(insert(set_layouts), values).inserted_primary_key
-    assert made is not None  # a row of one table has its key
-    return int(made[0])
 
 
 def _records() -> Select[Any]:
