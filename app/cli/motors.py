@@ -15,12 +15,23 @@ from app.cli.connecting import connected, run_command
 from app.cli.output import Output
 from app.cli.targets import add_connection, find_device
 from app.cli.users import opened
-from app.errors import MotorFieldError, MotorUnknownError, UsageError
+from app.errors import MotorUnknownError, UsageError
 from app.model.address import Address, parse_address
 from app.model.description import Entry
-from app.model.motor import PLATE_FIELDS, Draft, Motor, Plate, PlateField, disagreements, entries_of, is_of_the_machine
+from app.model.motor import (
+    PLATE_FIELDS,
+    Draft,
+    Motor,
+    Plate,
+    PlateField,
+    disagreements,
+    entries_of,
+    flaw,
+    is_of_the_machine,
+    parse_value,
+)
 from app.model.motor_diff import PlateRow, RowState, ValueRow, compare_plates, compare_values
-from app.model.values import parse, show, to_scaled
+from app.model.values import show, to_scaled
 from app.service.connection import Connection
 from app.service.devices import Target
 from app.service.motors import Motors, description, read_motor
@@ -229,7 +240,7 @@ async def _edit(arguments: argparse.Namespace, output: Output, motors: Motors) -
 
 
 def _changed(draft: Draft, arguments: argparse.Namespace) -> Draft:
-    """The draft with what ``--plate``, ``--set`` and ``--remarks`` say. Raises UsageError, MotorFieldError, …"""
+    """The draft with what ``--plate``, ``--set`` and ``--remarks`` say. Raises UsageError, MotorFieldError."""
     plate, values = draft.plate, dict(draft.values)
     for text in arguments.plate:
         name, found = _pair(text)
@@ -238,7 +249,7 @@ def _changed(draft: Draft, arguments: argparse.Namespace) -> Draft:
         name, found = _pair(text)
         entry = description().entry(parse_address(name))
         if found:
-            values[entry.address] = int(parse(description(), entry, found, values.get))
+            values[entry.address] = parse_value(description(), entry, found)
         else:
             values.pop(entry.address, None)
     remarks = draft.remarks if arguments.remarks is None else arguments.remarks
@@ -260,7 +271,7 @@ def _plate_value(name: str, text: str) -> dict[str, Any]:
     try:
         return {name: Decimal(text.replace(",", ".")) if text else None}
     except InvalidOperation as error:
-        raise MotorFieldError(field=name, reason_key="motor.file.no_number") from error
+        raise flaw(name, "no_number") from error
 
 
 async def _import(arguments: argparse.Namespace, output: Output, motors: Motors) -> int:
@@ -322,7 +333,7 @@ def _tell(output: Output, motors: Sequence[Motor], lines: Sequence[str]) -> None
 
 
 def _plate_name(field: PlateField, output: Output) -> str:
-    return output.texts(f"motor.plate.{field.name}")
+    return output.texts(f"motor.field.{field.name}")
 
 
 def _with_unit(field: PlateField, found: Decimal | str | None) -> str:

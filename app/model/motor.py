@@ -14,11 +14,11 @@ from decimal import Decimal
 from enum import Enum
 from typing import Any, Final
 
-from app.errors import MotorFieldError
+from app.errors import HubsideError, LimitError, MotorFieldError
 from app.model.address import Address, parse_address
 from app.model.checks import check_write
 from app.model.description import Description, Entry, RestoreClass
-from app.model.values import quantity_of
+from app.model.values import parse, quantity_of
 
 DESCRIPTION_ID: Final = "oat-pmc"
 INDICES: Final = (0x6402, 0x6410, 0x6073, 0x6076, 0x6080, 0x60F6, 0x60F9)
@@ -154,13 +154,12 @@ def wanted_values(description: Description, values: Mapping[Address, int]) -> di
 def checked(description: Description, draft: Draft) -> Draft:
     """The draft with its texts trimmed, or the first reason why it is none.
 
-    Raises MotorFieldError for maker, type, plate and remarks; for parameters UnknownObjectError, AccessError,
-    ValueTypeError or LimitError.
+    Raises MotorFieldError.
     """
     maker, kind = checked_name("maker", draft.maker), checked_name("type", draft.type)
     remarks = draft.remarks.strip()
     if len(remarks) > LONGEST_REMARKS:
-        raise MotorFieldError(field="remarks", reason_key="motor.flaw.long", maximum=str(LONGEST_REMARKS))
+        raise flaw("remarks", "long", maximum=str(LONGEST_REMARKS))
     check_values(description, draft.values)
     return Draft(maker, kind, checked_plate(draft.plate), dict(sorted(draft.values.items())), remarks)
 
@@ -169,9 +168,9 @@ def checked_name(name: str, text: str) -> str:
     """Maker or type, with its blanks put in order. Raises MotorFieldError."""
     text = " ".join(text.split())
     if not text:
-        raise MotorFieldError(field=name, reason_key="motor.flaw.missing")
+        raise flaw(name, "missing")
     if len(text) > LONGEST_NAME or not text.isprintable():
-        raise MotorFieldError(field=name, reason_key="motor.flaw.long", maximum=str(LONGEST_NAME))
+        raise flaw(name, "long", maximum=str(LONGEST_NAME))
     return text
 
 
@@ -190,11 +189,11 @@ def checked_plate(plate: Plate) -> Plate:
 def _checked_number(one: PlateField, number: Decimal) -> Decimal:
     limits = {"minimum": str(one.minimum), "maximum": str(one.maximum), "unit": one.unit}
     if not number.is_finite() or not (one.minimum or 0) <= number <= (one.maximum or 0):
-        raise MotorFieldError(field=one.name, reason_key="motor.flaw.range", **limits)
+        raise flaw(one.name, "range", **limits)
     # A float of JSON or a spreadsheet has digits behind that nobody typed.
     rounded = round(number, one.decimals)
     if abs(rounded - number) > Decimal("1e-6"):
-        raise MotorFieldError(field=one.name, reason_key="motor.flaw.decimals", decimals=str(one.decimals))
+        raise flaw(one.name, "decimals", decimals=str(one.decimals))
     return _plain(rounded)
 
 
@@ -205,16 +204,39 @@ def _plain(number: Decimal) -> Decimal:
 
 
 def check_values(description: Description, values: Mapping[Address, int]) -> None:
-    """Type, limits and enumeration of every value, and that it is one of a motor's.
-
-    Raises UnknownObjectError, AccessError, ValueTypeError, LimitError, or MotorFieldError for an object of no motor.
-    """
-    known = {entry.address for entry in entries_of(description)}
+    """Type, limits and enumeration of every value, and that it is one of a motor's. Raises MotorFieldError."""
+    known = {entry.address: entry for entry in entries_of(description)}
     for address, raw in values.items():
-        entry = description.entry(address)
         if address not in known:
-            raise MotorFieldError(field=address.short, reason_key="motor.flaw.no_parameter")
-        check_write(description, entry, raw, values.get)
+            raise flaw(address.short, "no_parameter")
+        try:
+            check_write(description, known[address], raw, values.get)
+        except HubsideError as error:
+            raise flaw_of(known[address], error) from error
+
+
+def parse_value(description: Description, entry: Entry, text: str) -> int:
+    """The raw value of what a person typed for a parameter. Raises MotorFieldError."""
+    try:
+        return int(parse(description, entry, text, lambda _address: None))
+    except HubsideError as error:
+        raise flaw_of(entry, error) from error
+
+
+def flaw(name: str, what: str, **details: str) -> MotorFieldError:
+    """Why a field does not fit; ``what`` is the end of the text key ``motor.flaw.…``."""
+    named = {"named_key": f"motor.field.{name}"} if name.isidentifier() else {"named": name}
+    return MotorFieldError(field=name, reason_key=f"motor.flaw.{what}", **named, **details)
+
+
+def flaw_of(entry: Entry, error: HubsideError) -> MotorFieldError:
+    """What the checks of a write say of a parameter, for one that is only kept."""
+    details = {name: str(detail) for name, detail in error.details.items() if name not in ("address", "name", "reason")}
+    details["named"] = f"{entry.address.short} {entry.title}"
+    if isinstance(error, LimitError):
+        return MotorFieldError(field=entry.address.short, reason_key="motor.flaw.range", **details)
+    why = str(error.details.get("reason", error))
+    return MotorFieldError(field=entry.address.short, reason_key="motor.flaw.misfit", why=why, **details)
 
 
 def disagreements(description: Description, draft: Draft) -> list[tuple[PlateField, Address]]:

@@ -13,11 +13,11 @@ from decimal import Decimal, InvalidOperation
 from typing import Any, Final
 from uuid import UUID
 
-from app.errors import HubsideError, MotorFileError, UsageError
+from app.errors import MotorFieldError, MotorFileError, UsageError
 from app.model.address import Address, parse_address
 from app.model.description import Description, Entry
-from app.model.motor import PLATE_FIELDS, Draft, Motor, Plate, PlateField, Source, checked, entries_of
-from app.model.values import parse, quantity_of, show
+from app.model.motor import PLATE_FIELDS, Draft, Motor, Plate, PlateField, Source, checked, entries_of, parse_value
+from app.model.values import quantity_of, show
 
 ID: Final = "id"
 SOURCE: Final = "source"
@@ -171,7 +171,7 @@ class _Columns:
         )
         try:
             draft = checked(self._description, draft)
-        except HubsideError as error:
+        except MotorFieldError as error:
             raise self._of(line, error) from error
         return FileRow(line, self._id(line, by_key.get(ID, "")), draft, source == Source.EXAMPLE.value)
 
@@ -210,10 +210,9 @@ class _Columns:
         for key, entry in self._entries.items():
             if cells.get(key):
                 try:
-                    raw = parse(self._description, entry, cells[key], lambda _address: None)
-                except HubsideError as error:
+                    yield entry.address, parse_value(self._description, entry, cells[key])
+                except MotorFieldError as error:
                     raise self._of(line, error) from error
-                yield entry.address, int(raw)
 
     def _id(self, line: int, text: str) -> str | None:
         if not text:
@@ -226,11 +225,11 @@ class _Columns:
             raise self._error(line, ID, "motor.file.id")
         return str(found)
 
-    def _of(self, line: int, error: HubsideError) -> MotorFileError:
-        """An error of a motor, at its place in the file; its text becomes the reason."""
-        key = str(error.details.get("field", error.details.get("address")))
-        details = {"reason_key": error.text_key, **error.details}
-        return MotorFileError(**{**details, "file": self._file, "line": line, "column": self._titles.get(key, key)})
+    def _of(self, line: int, error: MotorFieldError) -> MotorFileError:
+        """A flaw of a motor, at its place in the file."""
+        key = str(error.details["field"])
+        at = {"file": self._file, "line": line, "column": self._titles.get(key, key)}
+        return MotorFileError(**{**error.details, **at})
 
     def _error(self, line: int, column: str, reason_key: str, **details: Any) -> MotorFileError:
         return MotorFileError(file=self._file, line=line, column=column, reason_key=reason_key, **details)

@@ -115,7 +115,7 @@ class Motors:
     # -- changing --------------------------------------------------------------------
 
     async def add(self, draft: Draft, person: str, source: Source = Source.TYPED, origin: str = "") -> Motor:
-        """Keep a motor that is not known yet. Raises MotorFieldError, LimitError and others of ``checked``."""
+        """Keep a motor that is not known yet. Raises MotorFieldError."""
         motor = self._version(self._new_id(), 1, checked(description(), draft), source, origin, person)
         await self._store.run(lambda kept: motor_rows.put_version(kept, motor))
         self._note(Action.MOTOR_ADDED, motor, person)
@@ -134,8 +134,8 @@ class Motors:
     async def edit(self, motor_id: str, based_on: int, draft: Draft, person: str) -> Motor:
         """Keep another version; the one before stays. Nothing happens where it says nothing new.
 
-        Raises MotorUnknownError, MotorInventedError, MotorChangedError where ``based_on`` is no longer the newest, and
-        what ``checked`` raises.
+        Raises MotorUnknownError, MotorInventedError, MotorChangedError where ``based_on`` is no longer the newest,
+        MotorFieldError.
         """
         draft = checked(description(), draft)
         async with self._changing:

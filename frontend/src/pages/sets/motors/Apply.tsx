@@ -1,6 +1,8 @@
 import { Button, Select } from "@mantine/core";
 import { IconArrowRight } from "@tabler/icons-react";
+import { useQuery } from "@tanstack/react-query";
 import { useState } from "react";
+import { turbineQuery } from "../../../api/queries";
 import type { Motor, MotorForm } from "../../../api/motors";
 import { NeedsRole } from "../../../frame/NeedsRole";
 import { usePageSearch } from "../../../frame/search";
@@ -15,6 +17,9 @@ export function Apply({ motor, form }: { motor: Motor; form: MotorForm }) {
   const drives = useDrives(form);
   const [chosen, setChosen] = useState<string | null>(null);
   const device = chosen ?? drives[0]?.value ?? null;
+  const simulated = useQuery(turbineQuery).data?.mode === "twin";
+  // What nobody has measured goes into no real drive; the server says so too.
+  if (motor.deleted || (motor.invented && !simulated)) return null;
   return (
     <div className={classes.bar}>
       <span>{t("page.motors.apply_to")}</span>
@@ -25,6 +30,7 @@ export function Apply({ motor, form }: { motor: Motor; form: MotorForm }) {
         value={device}
         allowDeselect={false}
         disabled={drives.length === 0}
+        w={310}
         onChange={setChosen}
         data-testid="motor-apply-device"
       />

@@ -77,7 +77,7 @@ function useRows(doc: MotorComparison, form: MotorForm): Row[] {
           : found;
     return {
       key: row.field,
-      name: t(`motor.plate.${row.field}`),
+      name: t(`motor.field.${row.field}`),
       state: row.state,
       left: words(row.left),
       right: words(row.right),

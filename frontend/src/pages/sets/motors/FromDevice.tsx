@@ -50,6 +50,7 @@ export function FromDevice({ form }: { form: MotorForm }) {
           value={device}
           allowDeselect={false}
           disabled={drives.length === 0}
+          w={310}
           onChange={setChosen}
           data-testid="motor-device"
         />

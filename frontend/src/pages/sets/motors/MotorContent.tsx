@@ -25,7 +25,7 @@ export function MotorContent({ motor, list, form }: Props) {
       {motor.disagreements.length > 0 && (
         <p className={classes.note} data-testid="motor-disagrees">
           {t("page.motors.disagrees", {
-            fields: motor.disagreements.map((name) => t(`motor.plate.${name}`)).join(", "),
+            fields: motor.disagreements.map((name) => t(`motor.field.${name}`)).join(", "),
           })}
         </p>
       )}
@@ -68,7 +68,7 @@ function PlateData({ motor, form }: Omit<Props, "list">) {
         const text = plateText(field, motor.plate, t);
         return (
           <div key={field.name}>
-            <dt>{t(`motor.plate.${field.name}`)}</dt>
+            <dt>{t(`motor.field.${field.name}`)}</dt>
             <dd>
               {text === "" ? "–" : `${text} ${field.unit}`.trim()}{" "}
               {motor.disagreements.includes(field.name) && (

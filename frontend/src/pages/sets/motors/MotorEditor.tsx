@@ -1,7 +1,7 @@
 import { Button, CloseButton, Select, Textarea, TextInput } from "@mantine/core";
 import { IconDeviceFloppy } from "@tabler/icons-react";
 import { useMutation } from "@tanstack/react-query";
-import { type SyntheticEvent, useState } from "react";
+import { Fragment, type SyntheticEvent, useState } from "react";
 import {
   type Motor,
   motorCommands,
@@ -17,7 +17,6 @@ import {
   disagreeing,
   draftOf,
   flawOf,
-  labelOf,
   limits,
   namesOf,
   REMARKS,
@@ -90,15 +89,20 @@ export function MotorEditor({ form, motor, onDone }: Props) {
         {doubts.length > 0 && (
           <p className={classes.note} data-testid="motor-disagrees">
             {t("page.motors.disagrees", {
-              fields: doubts.map((field) => t(`motor.plate.${field.name}`)).join(", "),
+              fields: doubts.map((field) => t(`motor.field.${field.name}`)).join(", "),
             })}
           </p>
         )}
         <PlateInputs form={form} typed={typed} onType={type} tried={tried} />
         <h3>{t("page.motors.parameters")}</h3>
         <div className={classes.fields}>
-          {form.description.entries.map((entry) => (
-            <ParameterInput key={entry.address} form={form} entry={entry} typed={typed} onType={type} />
+          {groupsOf(form.description.entries).map((group) => (
+            <Fragment key={group[0]?.address}>
+              {group[0]?.kind === "record" && <h4>{t.nameOf(group[0].object_name)}</h4>}
+              {group.map((entry) => (
+                <ParameterInput key={entry.address} form={form} entry={entry} typed={typed} onType={type} />
+              ))}
+            </Fragment>
           ))}
         </div>
         <h3>{t("page.motors.column.remarks")}</h3>
@@ -116,6 +120,16 @@ export function MotorEditor({ form, motor, onDone }: Props) {
   );
 }
 
+/** What stands alone first, then one group a record. */
+function groupsOf(entries: readonly EntryDoc[]): EntryDoc[][] {
+  const records = new Map<string, EntryDoc[]>([["", []]]);
+  for (const entry of entries) {
+    const name = entry.kind === "record" ? entry.object_name : "";
+    records.set(name, [...(records.get(name) ?? []), entry]);
+  }
+  return [...records.values()];
+}
+
 interface InputProps {
   form: MotorForm;
   entry: EntryDoc;
@@ -126,7 +140,7 @@ interface InputProps {
 function ParameterInput({ form, entry, typed, onType }: InputProps) {
   const t = useTexts();
   const own = entry.restore !== "copy";
-  const label = `${entry.address} ${labelOf(entry, t)}`;
+  const label = `${entry.address} ${t.nameOf(entry.name)}`;
   const names = namesOf(form, entry);
   const text = typed[entry.address] ?? "";
   if (names) {
@@ -151,8 +165,14 @@ function ParameterInput({ form, entry, typed, onType }: InputProps) {
       error={flawOf(form, entry.address, typed, t)}
       inputMode="decimal"
       autoComplete="off"
-      rightSection={unit === "" ? null : <span className="dim">{unit}</span>}
-      rightSectionWidth={unit === "" ? 0 : 52}
+      rightSection={
+        unit === "" ? null : (
+          <span className="dim" style={{ fontSize: 13.5 }}>
+            {unit}
+          </span>
+        )
+      }
+      rightSectionWidth={unit === "" ? 0 : 60}
       rightSectionPointerEvents="none"
       value={text}
       onChange={(event) => onType(entry.address, event.currentTarget.value)}

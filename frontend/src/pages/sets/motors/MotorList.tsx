@@ -8,6 +8,8 @@ import { dateAndTime } from "../../../ui/format";
 import { InventedChip } from "./chips";
 import { devicesOf, placeOf, titleOf } from "./places";
 
+const HIDDEN_FIRST = ["remarks"];
+
 interface Props {
   list: List | undefined;
   pending: boolean;
@@ -31,6 +33,7 @@ export function MotorList({ list, pending, narrow }: Props) {
       empty={t(pending ? "page.loading" : "page.sets.empty.motors")}
       onOpen={(motor) => update({ motor: motor.id, columns: undefined })}
       selected={id}
+      hiddenFirst={HIDDEN_FIRST}
     />
   );
 }
@@ -49,7 +52,7 @@ function columnsOf(t: Translate, list: List | undefined, narrow: boolean): Table
     {
       id: "motor",
       title: title("motor"),
-      width: "minmax(220px, 2fr)",
+      width: narrow ? "minmax(220px, 2fr)" : "minmax(300px, 2fr)",
       fixed: true,
       text: (motor) => (motor.invented ? `${titleOf(motor)} ${t("motor.source.example")}` : titleOf(motor)),
       cell: (motor) => (
@@ -104,14 +107,14 @@ function columnsOf(t: Translate, list: List | undefined, narrow: boolean): Table
     {
       id: "changed",
       title: title("changed"),
-      width: "minmax(130px, 1fr)",
+      width: "minmax(168px, 1fr)",
       text: (motor) => (motor.invented ? "–" : `${dateAndTime(motor.t_ns / 1e6)} ${motor.person}`),
       by: (motor) => motor.t_ns,
     },
     {
       id: "devices",
       title: title("devices"),
-      width: "minmax(120px, 1fr)",
+      width: "minmax(150px, 1fr)",
       text: (motor) => devices(motor) || "–",
     },
     {

@@ -22,7 +22,7 @@ export function PlateInputs({ form, typed, onType, tried }: Props) {
         {NAMES.map((name) => (
           <TextInput
             key={name}
-            label={t(`page.motors.${name}`)}
+            label={t(`motor.field.${name}`)}
             withAsterisk
             error={tried ? flawOf(form, name, typed, t) : null}
             maxLength={80}
@@ -38,15 +38,21 @@ export function PlateInputs({ form, typed, onType, tried }: Props) {
         {form.plate.map((field) => (
           <TextInput
             key={field.name}
-            label={t(`motor.plate.${field.name}`)}
+            label={t(`motor.field.${field.name}`)}
             description={allowed(field, t)}
             inputWrapperOrder={["label", "input", "error", "description"]}
             error={flawOf(form, field.name, typed, t)}
             inputMode={field.text ? "text" : "decimal"}
             maxLength={80}
             autoComplete="off"
-            rightSection={field.unit === "" ? null : <span className="dim">{field.unit}</span>}
-            rightSectionWidth={field.unit === "" ? 0 : 52}
+            rightSection={
+              field.unit === "" ? null : (
+                <span className="dim" style={{ fontSize: 13.5 }}>
+                  {field.unit}
+                </span>
+              )
+            }
+            rightSectionWidth={field.unit === "" ? 0 : 60}
             rightSectionPointerEvents="none"
             value={typed[field.name] ?? ""}
             onChange={(event) => onType(field.name, event.currentTarget.value)}
