@@ -9,6 +9,7 @@ import { useDeviceName } from "../../ui/devices";
 import { dayAndTime } from "../../ui/format";
 import { storyOf } from "../../ui/problem";
 import { parameterSearch } from "../../ui/ReadingText";
+import { compareSearch, ofDevice, Source } from "../sets/compare/specs";
 import classes from "./Overview.module.css";
 
 /** The parameters as found now beside those that the last visit left. */
@@ -67,10 +68,24 @@ function Told({ changes }: { changes: Changes }) {
 
 function Device({ changed }: { changed: ChangedDevice }) {
   const t = useTexts();
-  const name = useDeviceName()(changed.device);
+  const slug = changed.device;
+  const name = useDeviceName()(slug);
   return (
     <>
-      <h3>{name}</h3>
+      <h3>
+        {name}{" "}
+        {changed.missing === null && (
+          <Link
+            to="/sets"
+            search={(before: PageSearch) =>
+              roomSearch(before, compareSearch([ofDevice(Source.Left, slug), ofDevice(Source.Found, slug)]))
+            }
+            data-testid={`compare-${slug}`}
+          >
+            {t("page.visit.compare")}
+          </Link>
+        )}
+      </h3>
       {changed.replaced && <Warning text={t("page.visit.replaced")} />}
       {changed.missing !== null && <Warning text={t(`page.visit.missing_${changed.missing}`)} />}
       <ul>
@@ -78,9 +93,7 @@ function Device({ changed }: { changed: ChangedDevice }) {
           <li key={row.address}>
             <Link
               to="/parameters"
-              search={(before: PageSearch) =>
-                roomSearch(before, parameterSearch(changed.device, row.address))
-              }
+              search={(before: PageSearch) => roomSearch(before, parameterSearch(slug, row.address))}
             >
               {row.address} {t.nameOf(row.name)}
             </Link>

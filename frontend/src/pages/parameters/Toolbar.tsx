@@ -9,6 +9,7 @@ import {
 import { memo, startTransition, useEffect, useRef, useState } from "react";
 import type { GroupTally } from "../../model/rows";
 import { useTexts } from "../../texts/texts";
+import { CompareMenu } from "./CompareMenu";
 import { useBenchOfTable } from "./context";
 import { DeviceActions } from "./DeviceActions";
 import { Tally } from "./Lines";
@@ -38,6 +39,7 @@ export const Toolbar = memo(function Toolbar(props: Props) {
       <GroupMenu tally={props.tally} onJump={props.onJump} />
       <TableMenu hidden={props.hidden} onHide={props.onHide} visible={props.visible} />
       <OnlyMenu only={props.only} onOnly={props.onOnly} />
+      <CompareMenu />
       <span className={classes.spacer} />
       <DeviceActions />
     </div>

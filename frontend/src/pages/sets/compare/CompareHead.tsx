@@ -40,7 +40,9 @@ export function CompareHead({ compared, against, onColumns }: Props) {
     const count = counts[at] ?? 0;
     const said = reference
       ? t("page.compare.head.reference")
-      : t(count === 1 ? "page.compare.head.differs_one" : "page.compare.head.differs", { count });
+      : count === 0
+        ? t("page.compare.head.none")
+        : t(count === 1 ? "page.compare.head.differs_one" : "page.compare.head.differs", { count });
     return (
       <div
         key={column.spec}
