@@ -5,10 +5,11 @@ Vectors are compared as numbers (``model.set_vector``): thousands of sets in som
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any, Final
+from itertools import repeat
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -38,8 +39,7 @@ class Mark(Enum):
     MISSING = "missing"
 
 
-@dataclass(frozen=True, slots=True)
-class Member:
+class Member(NamedTuple):
     """The latest set of one device. ``version`` is that of the description that it was read by."""
 
     record: str
@@ -52,14 +52,16 @@ class Member:
 class Fleet:
     """``members`` in the order of the rows of ``differs`` and ``lacks``, ``entries`` in that of their columns.
 
-    ``entries`` are the parameters that the golden set has, group by group. ``foreign`` are devices whose sets were read
-    by a description of another major version: they are not compared.
+    ``entries`` are the parameters that the golden set has, group by group; ``bound`` tells which of them may differ,
+    because they are bound to the single unit. ``foreign`` are devices whose sets were read by a description of another
+    major version: they are not compared.
     """
 
     golden: Shown
     entries: tuple[Entry, ...]
-    members: tuple[Member, ...]
-    foreign: tuple[Member, ...]
+    bound: Bools
+    members: Sequence[Member]
+    foreign: Sequence[Member]
     differs: Bools
     lacks: Bools
 
@@ -68,31 +70,29 @@ class Fleet:
         """The groups of the entries, in their order."""
         return tuple(dict.fromkeys(entry.group for entry in self.entries))
 
-    @property
-    def bound(self) -> Bools:
-        """Which entries may differ, because they are bound to the single unit."""
-        return np.array([entry.restore is RestoreClass.UNIT for entry in self.entries], bool)
-
     def by_group(self) -> Counts:
         """Differences that must not be, a row for each member and a column for each group."""
         groups = self.groups
-        starts = [next(n for n, entry in enumerate(self.entries) if entry.group == group) for group in groups]
-        if not groups:
-            return np.zeros((len(self.members), 0), np.int64)
-        return np.add.reduceat(self.differs & ~self.bound, starts, axis=1, dtype=np.int64)
+        places = np.array([groups.index(entry.group) for entry in self.entries], np.intp)
+        counting = np.zeros((len(self.entries), len(groups)), np.float32)
+        counting[np.arange(len(places)), places] = ~self.bound
+        found: Counts = (self.differs.astype(np.float32) @ counting).astype(np.int64)
+        return found
 
     def ranking(self) -> list[int]:
-        """Rows of the members: most differences first, then what is missing, then by device."""
-        different, missing = self.count(Mark.DIFFERENT), self.count(Mark.MISSING)
-        return sorted(range(len(self.members)), key=lambda n: (-different[n], -missing[n], self.members[n].device))
+        """Rows of the members: most differences first, then what is missing, then as they come."""
+        different, missing = np.array(self.count(Mark.DIFFERENT)), np.array(self.count(Mark.MISSING))
+        return [int(row) for row in np.lexsort((-missing, -different))]
 
     def count(self, mark: Mark) -> list[int]:
         """How often each member has it."""
-        return [int(count) for count in np.count_nonzero(self._marked(mark), axis=1)]
+        counts: list[int] = np.count_nonzero(self._marked(mark), axis=1).tolist()
+        return counts
 
     def per_entry(self, mark: Mark) -> list[int]:
         """How many members have it at each entry."""
-        return [int(count) for count in np.count_nonzero(self._marked(mark), axis=0)]
+        counts: list[int] = np.count_nonzero(self._marked(mark), axis=0).tolist()
+        return counts
 
     def marks(self, member: int) -> Iterator[Mark]:
         """One member's row."""
@@ -135,21 +135,19 @@ class _Scan:
     def __init__(self, golden: Shown) -> None:
         self._golden = golden
         self._entries = _parameters(golden)
-        self._major = _major(golden.column.version)
         self._plans: dict[int, _Plan] = {}
-        self._foreign: dict[int, str] = {}
         self._members: list[Member] = []
         self._strangers: list[Member] = []
         self._differs: list[Bools] = []
         self._lacks: list[Bools] = []
 
     def read(self, connection: Connection) -> None:
-        layouts = layouts_of(connection, self._golden.column.description.id)
+        """Scan the store."""
+        column = self._golden.column
+        layouts = layouts_of(connection, column.description.id)
+        words = _Words.of(layout_of(column.values), pack(column.values, layout_of(column.values)))
         for number, (version, addresses) in layouts.items():
-            if _major(version) == self._major:
-                self._plans[number] = _Plan(self._golden, self._entries, version, addresses)
-            else:
-                self._foreign[number] = version
+            self._plans[number] = _Plan(words, self._entries, version, addresses)
         scan_latest(connection, list(layouts), self._take)
 
     def _take(self, rows: Sequence[Any]) -> None:
@@ -157,70 +155,88 @@ class _Scan:
         for row in rows:
             by_layout.setdefault(row[3], []).append(row)
         for number, some in by_layout.items():
-            plan = self._plans.get(number)
-            if plan is None:
-                version = self._foreign[number]
-                self._strangers += [Member(record, device, t_ns, version) for record, device, t_ns, *_ in some]
-            else:
-                self._members += [Member(record, device, t_ns, plan.version) for record, device, t_ns, *_ in some]
-                self._differs.append(plan.differs(b"".join([row[4] for row in some])))
-                self._lacks.append(np.broadcast_to(plan.lacks, (len(some), len(plan.lacks))))
+            plan = self._plans[number]
+            devices, records, times, _layouts, vectors = zip(*some, strict=True)
+            found = map(Member, records, devices, times, repeat(plan.version))
+            if _major(plan.version) != _major(self._golden.column.version):
+                self._strangers += found
+                continue
+            self._members += found
+            self._differs.append(plan.differs(b"".join(vectors)))
+            self._lacks.append(np.broadcast_to(plan.lacks, (len(some), len(plan.lacks))))
 
     def fleet(self) -> Fleet:
+        """What was found."""
         none = np.zeros((0, len(self._entries)), bool)
         return Fleet(
-            self._golden,
-            self._entries,
-            tuple(self._members),
-            tuple(self._strangers),
-            np.concatenate([none, *self._differs]),
-            np.concatenate([none, *self._lacks]),
+            golden=self._golden,
+            entries=self._entries,
+            bound=np.array([entry.restore is RestoreClass.UNIT for entry in self._entries], bool),
+            members=self._members,
+            foreign=self._strangers,
+            differs=np.concatenate([none, *self._differs]),
+            lacks=np.concatenate([none, *self._lacks]),
         )
+
+
+@dataclass(frozen=True, slots=True)
+class _Words:
+    """The golden set: where the words of each address begin, how many there are, and all words."""
+
+    places: Mapping[Address, tuple[int, int]]
+    words: npt.NDArray[np.uint32]
+
+    @classmethod
+    def of(cls, layout: Sequence[str], vector: bytes) -> _Words:
+        return cls(_places(layout), np.frombuffer(vector, _WORD))
 
 
 class _Plan:
     """How sets of one layout are compared with the golden one: which words of theirs with which of its."""
 
-    def __init__(self, golden: Shown, entries: Sequence[Entry], version: str, addresses: Sequence[str]) -> None:
+    def __init__(self, golden: _Words, entries: Sequence[Entry], version: str, addresses: Sequence[str]) -> None:
         self.version = version
         theirs = _places(addresses)
         self._words = sum(count for _start, count in theirs.values())
-        layout = layout_of(golden.column.values)
-        values = np.frombuffer(pack(golden.column.values, layout), _WORD)
-        ours = _places(layout)
         own: list[int] = []
         other: list[int] = []
         self._starts: list[int] = []
         self._there: list[int] = []
-        alike = np.ones(len(entries), bool)
+        self._unlike = np.zeros(len(entries), bool)
         self.lacks = np.zeros(len(entries), bool)
         for number, entry in enumerate(entries):
-            start, count = ours[entry.address]
-            if entry.address not in theirs:
+            start, count = golden.places[entry.address]
+            place = theirs.get(entry.address)
+            if place is None:
                 self.lacks[number] = True
-            elif theirs[entry.address][1] != count:
-                alike[number] = False  # one takes more room than the other: they cannot be equal
+            elif place[1] != count:
+                self._unlike[number] = True  # one takes more room than the other: they cannot be equal
             else:
                 self._starts.append(len(own))
                 self._there.append(number)
                 own += range(start, start + count)
-                other += range(theirs[entry.address][0], theirs[entry.address][0] + count)
-        self._alike = alike
-        self._golden = values[own]
-        self._other = np.array(other, np.intp)
-        self._wide = len(own) > len(self._starts)
+                other += range(place[0], place[0] + count)
+        self._golden = golden.words[own]
+        self._other = _slice_of(other)
 
     def differs(self, vectors: bytes) -> Bools:
         """A row for each vector, a column for each entry."""
         words = np.frombuffer(vectors, _WORD).reshape(-1, self._words)
         unequal: Bools = words[:, self._other] != self._golden
-        if self._wide:
+        if len(self._starts) < len(self._golden):
             unequal = np.logical_or.reduceat(unequal, self._starts, axis=1)
-        if len(self._there) == len(self._alike):
+        if len(self._there) == len(self._unlike):
             return unequal
-        found = np.broadcast_to(~self._alike, (len(words), len(self._alike))).copy()
+        found = np.broadcast_to(self._unlike, (len(words), len(self._unlike))).copy()
         found[:, self._there] = unequal
         return found
+
+
+def _slice_of(numbers: list[int]) -> slice | Indices:
+    """The numbers as a slice where they follow one another, which spares a copy."""
+    if numbers and numbers == list(range(numbers[0], numbers[0] + len(numbers))):
+        return slice(numbers[0], numbers[0] + len(numbers))
+    return np.array(numbers, np.intp)
 
 
 def _places(layout: Sequence[str]) -> dict[Address, tuple[int, int]]:
