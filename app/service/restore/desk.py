@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
 import time
 from collections.abc import Callable, Coroutine, Mapping
@@ -11,6 +12,7 @@ from typing import Any, Final
 
 from app.errors import (
     HubsideError,
+    MotorUnknownError,
     RestoreChangedError,
     RestoreOpenError,
     RestoreRefusedError,
@@ -27,6 +29,7 @@ from app.service.journal import Journal, Kind
 from app.service.office.office import Office
 from app.service.restore import details as detail
 from app.service.restore.log import Kept, RestoreLog, load, new_row, value_rows
+from app.service.restore.motor_given import note_motors
 from app.service.restore.order import Cause, Order, Timing
 from app.service.restore.prepare import Prepared, prepare
 from app.service.restore.steps import Hands
@@ -241,6 +244,9 @@ class Desk:
         self._journal.by(person).note(_KIND_OF[end], None, **details)
         if transaction.found is not None and end is not End.INCOMPLETE:
             await self._keep(transaction.found, REASON_AFTER, person, Source.BACKUP)
+        if end is End.NEW:
+            with contextlib.suppress(StoreError, MotorUnknownError):
+                await note_motors(self._office.motors, json.loads(row.details)["devices"], person)
 
     async def wait(self, restore_id: str) -> End:
         """Until it is not worked on any more."""

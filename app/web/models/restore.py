@@ -38,7 +38,8 @@ class RestorePlace(BaseModel):
 class RestorePlanRequest(BaseModel):
     """Which sets (ids of records, or at least 8 digits of a hash) ``station`` is to have; one a device.
 
-    A set of the same device goes to it, any other to the device of its kind. ``selected`` null takes everything that
+    A set of the same device goes to it, any other to the device of its kind; ``motor:ID@VERSION:DEVICE`` stands for the
+    set of what a motor puts into its drive. ``selected`` null takes everything that
     may be taken. ``restart``: a restart of the devices is agreed to. ``accepted``: rules that an expert lets stay
     broken where they are broken already.
     """
@@ -46,7 +47,7 @@ class RestorePlanRequest(BaseModel):
     model_config = ConfigDict(extra="forbid")
 
     station: Slug
-    sets: Annotated[list[Annotated[str, Field(max_length=100)]], Field(min_length=1, max_length=20)]
+    sets: Annotated[list[Annotated[str, Field(max_length=300)]], Field(min_length=1, max_length=20)]
     selected: Annotated[list[RestorePlace], Field(max_length=5_000)] | None = None
     restart: bool = False
     other_blades_confirmed: bool = False

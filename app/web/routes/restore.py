@@ -12,6 +12,7 @@ from app.model.station import Place
 from app.service.bench import Bench
 from app.service.connection import Connection
 from app.service.restore.assign import assign
+from app.service.restore.motor_given import given_motor, is_motor
 from app.service.restore.order import Given, Order
 from app.service.restore.survey import targets_of
 from app.web.deps import BenchOf, ConnectionOf, PersonOf, needs
@@ -79,10 +80,11 @@ async def resume_restore(bench: BenchOf, person: PersonOf, restore_id: str, _req
 
 
 async def _order(bench: Bench, connection: Connection, person: SignedIn, request: RestorePlanRequest) -> Order:
-    """What the page asks for. Raises UsageError, SetUnknownError."""
-    library = bench.office.library
-    records = [await library.record(key) for key in request.sets]
+    """What the page asks for. Raises UsageError, SetUnknownError, MotorUnknownError, MotorInventedError."""
+    library, motors = bench.office.library, bench.office.motors
+    records = [await library.record(key) for key in request.sets if not is_motor(key)]
     sets = [Given(await library.set_of(record), record.id) for record in records]
+    sets += [await given_motor(motors, connection, key, person.person) for key in request.sets if is_motor(key)]
     given, homeless = assign(targets_of(connection, request.station), sets)
     chosen = request.selected
     full = request if isinstance(request, RestoreRequest) else None

@@ -3925,7 +3925,8 @@ export interface components {
          * RestorePlanRequest
          * @description Which sets (ids of records, or at least 8 digits of a hash) ``station`` is to have; one a device.
          *
-         *     A set of the same device goes to it, any other to the device of its kind. ``selected`` null takes everything that
+         *     A set of the same device goes to it, any other to the device of its kind; ``motor:ID@VERSION:DEVICE`` stands for the
+         *     set of what a motor puts into its drive. ``selected`` null takes everything that
          *     may be taken. ``restart``: a restart of the devices is agreed to. ``accepted``: rules that an expert lets stay
          *     broken where they are broken already.
          */

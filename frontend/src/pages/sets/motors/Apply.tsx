@@ -41,7 +41,13 @@ export function Apply({ motor, form }: { motor: Motor; form: MotorForm }) {
             rightSection={<IconArrowRight size={17} aria-hidden />}
             disabled={locked || device === null}
             onClick={() =>
-              update({ tab: "restore", motor: `${motor.id}@${motor.version}`, device: device ?? undefined })
+              update({
+                tab: "restore",
+                station: device?.split("/").slice(0, -1).join("/"),
+                sets: `motor:${motor.id}@${motor.version}:${device ?? ""}`,
+                motor: undefined,
+                find: undefined,
+              })
             }
             data-testid="motor-apply"
           >
