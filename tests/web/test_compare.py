@@ -66,3 +66,13 @@ async def test_a_column_that_cannot_be_shown_is_named(server: Server) -> None:
         assert (answer.status_code, problem["code"], problem["details"]["column"]) == (404, "column", column)
         assert problem["details"]["reason_key"] == f"compare.unresolved.{reason}"
         assert column in problem["text"]
+
+
+async def test_blades_stand_side_by_side_and_what_is_bound_to_one_is_set_apart(server: Server) -> None:
+    doc = (await server.client.get("/api/parity")).json()
+    assert doc["turbine"] == "wtg-07"
+    assert [(part["description_id"], part["blades"]) for part in doc["parts"]] == [
+        ("oat-pmm", [1, 2, 3]),
+        ("oat-pmc", [1, 2, 3]),
+    ]
+    assert all(len(row["cells"]) == 3 for part in doc["parts"] for row in part["comparison"]["rows"])

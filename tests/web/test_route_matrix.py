@@ -77,6 +77,8 @@ ROUTES: Final[dict[tuple[str, str], Role]] = {
     ("GET", "/api/sets/{turbine}/{file}/download"): VIEWER,
     ("POST", "/api/live/backup"): TECHNICIAN,
     ("POST", "/api/compare"): VIEWER,
+    ("GET", "/api/parity"): VIEWER,
+    ("POST", "/api/fleet"): VIEWER,
     ("GET", "/api/rules"): VIEWER,
     ("POST", "/api/rules/check"): VIEWER,
     # motors

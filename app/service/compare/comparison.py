@@ -17,9 +17,13 @@ class Compared:
     comparison: Comparison
 
 
+def compare_shown(shown: Sequence[Shown], everything: bool = False) -> Compared:
+    """Compare columns that are there."""
+    return Compared(tuple(shown), compare([one.column for one in shown], everything))
+
+
 async def compare_columns(
     columns: Columns, specs: Sequence[str], pending: Pending | None = None, everything: bool = False
 ) -> Compared:
     """Compare what ``specs`` name. Raises ColumnError, which names the column, StoreError, SetFileError."""
-    shown = tuple([await columns.resolve(spec, pending) for spec in specs])
-    return Compared(shown, compare([one.column for one in shown], everything))
+    return compare_shown([await columns.resolve(spec, pending) for spec in specs], everything)

@@ -19,7 +19,6 @@ from app.model.description import Description, Entry, RestoreClass
 from app.model.diff.compare import is_parameter
 from app.model.set_vector import WIDTH, layout_of, pack, parse_layout
 from app.service.compare.sources import Columns, Shown
-from app.service.compare.spec import ColumnKind, ColumnSpec
 from app.store.fleet_rows import layouts_of, scan_latest
 from app.store.store import Connection, Store
 
@@ -117,14 +116,11 @@ class Fleet:
 
 
 async def compare_fleet(columns: Columns, store: Store, golden: str) -> Fleet:
-    """Compare the latest set of every device with ``golden``: a record, the beginning of a hash, or a description's id.
+    """Compare the latest set of every device with the column ``golden``, such as ``golden:oat-pmc`` or ``set:0195f3a2``.
 
-    Of a description its golden set is taken. Raises ColumnError, StoreError.
+    Raises ColumnError, StoreError.
     """
-    tagged = columns.ground.description(golden) is not None
-    spec = ColumnSpec(ColumnKind.GOLDEN if tagged else ColumnKind.SET, golden)
-    shown = await columns.resolve(str(spec))
-    scan = _Scan(shown)
+    scan = _Scan(await columns.resolve(golden))
     await store.run(scan.read)
     return scan.fleet()
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 from app.errors import ColumnError
-from app.model.site import Turbine
-from app.service.compare.comparison import Compared, compare_columns
-from app.service.compare.sources import Columns
+from app.model.site import Device, Turbine
+from app.service.compare.comparison import Compared, compare_shown
+from app.service.compare.sources import Columns, Shown
 from app.service.compare.spec import ColumnKind, ColumnSpec
 
 
@@ -35,30 +34,26 @@ async def compare_blades(
     """
     parts = []
     for description_id in dict.fromkeys(device.description_id for device in turbine.devices):
-        found = [
-            (station.blade, device)
-            for station in turbine.stations
-            for device in station.devices
-            if station.blade is not None and device.description_id == description_id
-        ]
-        specs = {blade: str(ColumnSpec(kind, device.slug)) for blade, device in found}
-        there = await _there(columns, list(specs.values()))
-        blades = tuple(blade for blade, spec in specs.items() if spec in there)
-        if len(blades) > 1:
-            compared = await compare_columns(columns, [specs[blade] for blade in blades], everything=everything)
-            without = tuple(blade for blade in specs if blade not in blades)
+        shown: list[tuple[int, Shown]] = []
+        without: list[int] = []
+        for blade, device in _devices(turbine, description_id):
+            try:
+                shown.append((blade, await columns.resolve(str(ColumnSpec(kind, device.slug)))))
+            except ColumnError:
+                without.append(blade)
+        if len(shown) > 1:
+            compared = compare_shown([one for _blade, one in shown], everything)
             name = compared.columns[0].column.description.name
-            parts.append(Part(description_id, name, blades, without, compared))
+            blades = tuple(blade for blade, _one in shown)
+            parts.append(Part(description_id, name, blades, tuple(without), compared))
     return tuple(parts)
 
 
-async def _there(columns: Columns, specs: Sequence[str]) -> set[str]:
-    """The columns that can be shown."""
-    found = set()
-    for spec in specs:
-        try:
-            await columns.resolve(spec)
-        except ColumnError:
-            continue
-        found.add(spec)
-    return found
+def _devices(turbine: Turbine, description_id: str) -> list[tuple[int, Device]]:
+    """The devices of that kind at the blades."""
+    return [
+        (station.blade, device)
+        for station in turbine.stations
+        for device in station.devices
+        if station.blade is not None and device.description_id == description_id
+    ]

@@ -108,6 +108,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/fleet": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Fleet
+         * @description One golden set against the latest set of every device of its kind.
+         */
+        post: operations["fleet"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/instructor": {
         parameters: {
             query?: never;
@@ -1102,6 +1122,26 @@ export interface paths {
          * @description All versions of a motor, newest first, also of one that was deleted.
          */
         get: operations["motor_versions"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/parity": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Parity
+         * @description The blades of a turbine side by side, each kind of device by itself.
+         */
+        get: operations["parity"];
         put?: never;
         post?: never;
         delete?: never;
@@ -2617,6 +2657,124 @@ export interface components {
             addresses: string[];
         };
         /**
+         * FleetAddress
+         * @description One parameter of the golden set, and at how many devices it differs, differs as it may, or is missing.
+         */
+        FleetAddress: {
+            /** Address */
+            address: string;
+            /** Different */
+            different: number;
+            /** Golden Shown */
+            golden_shown: string;
+            /** Golden Unit */
+            golden_unit: string;
+            /** Group */
+            group: string;
+            /** Missing */
+            missing: number;
+            /** Name */
+            name: string;
+            /**
+             * Restore
+             * @enum {string}
+             */
+            restore: "copy" | "unit" | "factory" | "never";
+            /** Unit */
+            unit: number;
+        };
+        /**
+         * FleetDevice
+         * @description The latest set of one device. ``by_group``: differences in each group; ``top``: addresses that differ.
+         *
+         *     ``marks``: of each parameter of the group that was asked for.
+         */
+        FleetDevice: {
+            /** By Group */
+            by_group: number[];
+            /** Device */
+            device: string;
+            /** Different */
+            different: number;
+            /** Marks */
+            marks: ("same" | "different" | "unit" | "missing")[];
+            /** Missing */
+            missing: number;
+            /** Record */
+            record: string;
+            /** T Ns */
+            t_ns: number;
+            /** Top */
+            top: string[];
+            /** Turbine */
+            turbine: string;
+            /** Unit */
+            unit: number;
+        };
+        /**
+         * FleetDoc
+         * @description One golden set against the latest set of every device of its kind, those that differ most first.
+         *
+         *     ``total`` devices were compared, ``equal`` of them have no difference that must not be; ``addresses`` are those that
+         *     differ or are missing somewhere, the most frequent first. ``marked``: the addresses of the devices' ``marks``.
+         */
+        FleetDoc: {
+            /** Addresses */
+            addresses: components["schemas"]["FleetAddress"][];
+            /** Devices */
+            devices: components["schemas"]["FleetDevice"][];
+            /** Equal */
+            equal: number;
+            /** Foreign */
+            foreign: components["schemas"]["ForeignDevice"][];
+            golden: components["schemas"]["ColumnDoc"];
+            /** Groups */
+            groups: string[];
+            /** Marked */
+            marked: string[];
+            /** Parameters */
+            parameters: number;
+            /** Total */
+            total: number;
+        };
+        /**
+         * FleetRequest
+         * @description ``golden``: a record or the beginning of its hash; null takes the set that is marked golden for the description.
+         *
+         *     ``group`` asks for the marks of its parameters; ``limit`` for so many devices, those that differ most.
+         * @example {
+         *       "description_id": "oat-pmc",
+         *       "group": "position"
+         *     }
+         */
+        FleetRequest: {
+            /** Description Id */
+            description_id: string;
+            /** Golden */
+            golden?: string | null;
+            /** Group */
+            group?: string | null;
+            /**
+             * Limit
+             * @default 500
+             */
+            limit: number;
+        };
+        /**
+         * ForeignDevice
+         * @description A device that cannot be compared: its set was read by a description of another major version.
+         */
+        ForeignDevice: {
+            /** Description Version */
+            description_version: string;
+            /** Device */
+            device: string;
+            /** Record */
+            record: string;
+            /** T Ns */
+            t_ns: number;
+        };
+        /**
          * FoundDoc
          * @description A device that answered, and where it might belong; null where it does not say.
          */
@@ -3355,6 +3513,33 @@ export interface components {
             last: {
                 [key: string]: components["schemas"]["ParameterChange"];
             };
+        };
+        /**
+         * ParityDoc
+         * @description The blades of one turbine; no part where fewer than two blades have such columns.
+         */
+        ParityDoc: {
+            /** Parts */
+            parts: components["schemas"]["ParityPart"][];
+            /** Turbine */
+            turbine: string;
+        };
+        /**
+         * ParityPart
+         * @description One kind of device, a column for each of ``blades``; ``without``: blades of which there is no such column.
+         *
+         *     Rows whose state is "unit" are the differences that are allowed.
+         */
+        ParityPart: {
+            /** Blades */
+            blades: number[];
+            comparison: components["schemas"]["ComparisonDoc"];
+            /** Description Id */
+            description_id: string;
+            /** Name */
+            name: string;
+            /** Without */
+            without: number[];
         };
         /**
          * PlaceDoc
@@ -5632,6 +5817,72 @@ export interface operations {
             };
             /** @description Not Found */
             404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    fleet: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "description_id": "oat-pmc",
+                 *       "group": "position"
+                 *     }
+                 */
+                "application/json": components["schemas"]["FleetRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["FleetDoc"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -9510,6 +9761,67 @@ export interface operations {
             };
             /** @description Not Found */
             404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    parity: {
+        parameters: {
+            query?: {
+                /** @description Slug; the connected one where not given */
+                turbine?: string | null;
+                kind?: "live" | "stored" | "found" | "left" | "delivered";
+                all?: boolean;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ParityDoc"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
                 headers: {
                     [name: string]: unknown;
                 };

@@ -1,0 +1,236 @@
+"""The whole fleet against a golden set: 5,000 stored sets of 400 parameters, against a loop over 5,000 JSON files.
+
+Ours reads a store file as a server has it, opened anew for every round; the peer reads the set files of the same sets,
+compares dictionaries, and counts by group. Both must find the same.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import hashlib
+import json
+import random
+import shutil
+import time
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Final
+
+from app.model.address import Address
+from app.model.datatypes import DataType, Raw
+from app.model.description import Access, Description, Entry, Kind, RestoreClass
+from app.model.description_file import load_builtin
+from app.model.set_record import Source
+from app.model.sets import Identity, Origin, ParameterSet, dump_set, iso_time
+from app.service.compare.fleet import Fleet, Mark, compare_fleet
+from app.service.compare.ground import Ground
+from app.service.compare.sources import Columns
+from app.service.library.library import Library
+from app.service.office.audit import AuditLog
+from app.store.migrations import STEPS
+from app.store.store import Store
+from bench._priority import preferred
+from bench._result import Result
+
+SETS: Final = 5000
+PARAMETERS: Final = 400
+TARGET: Final = 20.0
+LIMIT_S: Final = 0.5
+GROUPS: Final = 16
+UNIT_BOUND: Final = 3
+START_NS: Final = 1_767_225_600_000_000_000
+TYPES: Final = (DataType.UNSIGNED8, DataType.UNSIGNED16, DataType.UNSIGNED32, DataType.INTEGER16, DataType.INTEGER32)
+CACHE: Final = Path(__file__).resolve().parent.parent / ".cache" / "bench" / "fleet"
+VERSION: Final = 1
+"""Of the generated sets: raised with what is generated below."""
+
+
+@dataclass(frozen=True)
+class Line:
+    """What both find of one device, in the order of the ranking."""
+
+    device: str
+    different: int
+    by_group: Mapping[str, int]
+
+
+def run(full: bool) -> Result:
+    """Compare; ``full`` takes more rounds."""
+    return measure(SETS, PARAMETERS, peer_rounds=9 if full else 3, rounds=31 if full else 11)
+
+
+def measure(sets: int, parameters: int, peer_rounds: int, rounds: int, cache: Path = CACHE) -> Result:
+    """Both over the same sets; medians count."""
+    description = describe(parameters)
+    folder = prepare(cache, description, sets)
+    golden = golden_set(description)
+    with preferred() as scheduling:
+        peers = [timed(lambda: naive(folder / "sets", description, golden)) for _ in range(peer_rounds)]
+        ours = [asyncio.run(stored(folder / "store", description, golden.hash)) for _ in range(rounds)]
+    peer_s = sorted(each for each, _lines in peers)[peer_rounds // 2]
+    own_s = sorted(each for each, _lines in ours)[rounds // 2]
+    shortfalls = []
+    if own_s >= LIMIT_S:
+        shortfalls.append(f"{own_s:.3f} s, wanted less than {LIMIT_S} s")
+    if any(lines != peers[0][1] for _s, lines in (*peers, *ours)):
+        shortfalls.append("the two do not find the same")
+    differing = sum(line.different for line in ours[0][1])
+    return Result(
+        peer_s / own_s,
+        TARGET,
+        (
+            f"{sets} sets of {parameters} parameters, {differing} differences; scheduling: {scheduling}; medians",
+            f"json.load and compare, one file after another: {peer_s:.3f} s ({_times(peers)})",
+            f"ours, out of a store file just opened: {own_s * 1000:.1f} ms ({_times(ours)})",
+        ),
+        tuple(shortfalls),
+    )
+
+
+def _times(runs: list[tuple[float, list[Line]]]) -> str:
+    return " ".join(f"{each:.3f}" for each, _lines in sorted(runs, key=lambda one: one[0]))
+
+
+def timed(work: object) -> tuple[float, list[Line]]:
+    """How long it took, and what was found."""
+    assert callable(work)
+    start = time.perf_counter()
+    found: list[Line] = work()
+    return time.perf_counter() - start, found
+
+
+# -- the two --------------------------------------------------------------------------
+
+
+def naive(folder: Path, description: Description, golden: ParameterSet) -> list[Line]:
+    """The peer: each file read and compared by itself."""
+    wanted = {str(address): raw for address, raw in golden.values.items()}
+    groups = {str(entry.address): entry.group for entry in description}
+    bound = {str(entry.address) for entry in description if entry.restore is RestoreClass.UNIT}
+    lines = []
+    for path in folder.iterdir():
+        with path.open(encoding="utf-8") as file:
+            content = json.load(file)
+        values = content["values"]
+        counts: dict[str, int] = {}
+        for address, raw in wanted.items():
+            if values.get(address) != raw and address not in bound:
+                group = groups[address]
+                counts[group] = counts.get(group, 0) + 1
+        lines.append(Line(content["origin"]["device"], sum(counts.values()), counts))
+    return sorted(lines, key=lambda line: -line.different)
+
+
+async def stored(folder: Path, description: Description, golden: str) -> tuple[float, list[Line]]:
+    """Ours: the use case of the page, over a store that was just opened."""
+    store = Store.open(folder)
+    try:
+        audit = AuditLog(store)
+        library = Library(store, audit, time.time_ns)
+        columns = Columns(Ground(time.time_ns, library=library, known=(description,)))
+        start = time.perf_counter()
+        fleet = await compare_fleet(columns, store, f"set:{golden}")
+        ranking, counts, different = fleet.ranking(), fleet.by_group(), fleet.count(Mark.DIFFERENT)
+        elapsed_s = time.perf_counter() - start
+        await audit.close()
+    finally:
+        store.close()
+    return elapsed_s, [_line(fleet, member, counts[member].tolist(), different[member]) for member in ranking]
+
+
+def _line(fleet: Fleet, member: int, counts: list[int], different: int) -> Line:
+    by_group = {group: count for group, count in zip(fleet.groups, counts, strict=True) if count}
+    return Line(fleet.members[member].device, different, by_group)
+
+
+# -- what is compared -----------------------------------------------------------------
+
+
+def describe(parameters: int) -> Description:
+    """A kind of device with so many parameters, of the types that drives have."""
+    like = load_builtin("oat-pmc")
+    groups = tuple(f"group-{number}" for number in range(GROUPS))
+    entries = {}
+    for number in range(parameters):
+        address = Address(0x3000 + number // 8, number % 8 + 1)
+        entries[address] = Entry(
+            address=address,
+            name=f"parameter {number}",
+            object_name=f"object {number // 8}",
+            kind=Kind.RECORD,
+            type=TYPES[number % len(TYPES)],
+            access=Access.RW,
+            pdo=False,
+            default=0,
+            saved=True,
+            group=groups[number * GROUPS // parameters],
+            section="",
+            restore=RestoreClass.UNIT if number < UNIT_BOUND else RestoreClass.COPY,
+        )
+    return replace(like, id="bench-drive", version="1.0.0", entries=entries, groups=groups)
+
+
+def golden_set(description: Description) -> ParameterSet:
+    """The set that all are held against."""
+    some = random.Random(1)
+    return _set(description, {entry.address: _value(entry, some) for entry in description}, "wtg-0000/blade-1/pmc", 0)
+
+
+def fleet_sets(description: Description, sets: int) -> Iterator[ParameterSet]:
+    """One set of each device: most hardly differ from the golden one, some do in many places."""
+    some = random.Random(2)
+    golden = golden_set(description).values
+    entries = list(description)
+    yield golden_set(description)
+    for number in range(1, sets):
+        values = dict(golden)
+        many = some.choice((0, 0, 1, 2, 3, 5, 8)) if number % 100 else len(entries) // 3
+        for entry in [*entries[:UNIT_BOUND], *some.sample(entries, many)]:
+            values[entry.address] = _value(entry, some)
+        yield _set(description, values, f"wtg-{number // 3:04}/blade-{number % 3 + 1}/pmc", number)
+
+
+def _value(entry: Entry, some: random.Random) -> int:
+    low, high = entry.type.range or (0, 0)
+    return some.choice((some.randint(low, high), some.randint(max(low, -1000), min(high, 1000))))
+
+
+def _set(description: Description, values: Mapping[Address, Raw], device: str, number: int) -> ParameterSet:
+    taken = iso_time(START_NS + number * 60_000_000_000)
+    return ParameterSet(
+        description.id,
+        description.version,
+        Identity(device_type=0x20192, device_name="bench drive", hardware="1", software="2.4", serial=1000 + number),
+        Origin(device.partition("/")[0], device, 11, taken, "Tester", "yearly service", "hubside"),
+        values,
+    )
+
+
+def prepare(cache: Path, description: Description, sets: int) -> Path:
+    """The folder with the store and the set files, made where it is not there yet."""
+    schema = hashlib.sha256(repr(STEPS).encode()).hexdigest()[:8]
+    folder = cache / f"{VERSION}-{schema}-{sets}-{len(description.entries)}"
+    if folder.is_dir():
+        return folder
+    making = folder.with_name(f"{folder.name}.making")
+    shutil.rmtree(making, ignore_errors=True)
+    (making / "sets").mkdir(parents=True)
+    whole = list(fleet_sets(description, sets))
+    for number, one in enumerate(whole):
+        (making / "sets" / f"{number}.json").write_text(dump_set(one), encoding="utf-8")
+    asyncio.run(_fill(making / "store", whole))
+    making.rename(folder)
+    return folder
+
+
+async def _fill(folder: Path, sets: list[ParameterSet]) -> None:
+    store = Store.open(folder)
+    try:
+        audit = AuditLog(store)
+        library = Library(store, audit, time.time_ns)
+        for start in range(0, len(sets), 250):
+            await library.put(sets[start : start + 250], Source.FILE)
+        await audit.close()
+    finally:
+        store.close()
