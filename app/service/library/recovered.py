@@ -1,0 +1,213 @@
+"""Parameter sets out of a recording: what its SDO traffic showed of each device, whoever asked.
+
+Of each object the last transfer counts that was acknowledged; a write that nobody saw end makes the object unknown.
+Every value keeps its instant and its direction. What came before a boot-up or a gap is kept and marked: the device may
+hold another value since, as after a boot-up without a save.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from enum import Enum
+from pathlib import Path
+from typing import Final
+
+from app import __version__
+from app.errors import RecordingError
+from app.model.address import Address
+from app.model.datatypes import Raw
+from app.model.description import Description
+from app.model.sets import Origin, ParameterSet, identity_of, iso_time
+from app.recording.content import Event, EventKind
+from app.recording.reader import Recording, open_recording
+from app.service.devices import decode
+from app.wire.decoder import CanOpenDecoder
+from app.wire.frame import Can, Direction
+from app.wire.records import BootUpSeen, Outcome, Record, SdoAccess, SdoSeen
+from app.wire.sdo import Abort
+
+NOT_SEEN: Final = "not seen"
+UNFINISHED: Final = "write not finished"
+_GAPS: Final = frozenset({EventKind.FRAMES_LOST, EventKind.GAP, EventKind.BUS_LOST})
+
+
+class Doubt(Enum):
+    """What happened after a value was seen, so that the device may hold another one."""
+
+    BOOT_UP = "boot-up"
+    GAP = "gap"
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """How a value came to be known: when, read or written, by this tool or another master."""
+
+    t_ns: int
+    access: SdoAccess
+    ours: bool
+    doubt: Doubt | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class RecoveredSet:
+    """The set of one device, and how each of its values was seen."""
+
+    bus: str
+    parameters: ParameterSet
+    seen: Mapping[Address, Seen]
+    unknown: tuple[Address, ...] = ()
+    """Objects that were seen and that the description does not have."""
+
+
+@dataclass(frozen=True, slots=True)
+class Recovered:
+    """What a recording gave. ``nameless`` are nodes with SDO traffic of which it is not told what they are."""
+
+    sets: tuple[RecoveredSet, ...]
+    nameless: Mapping[tuple[str, int], int] = field(default_factory=dict)
+    damages: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Named:
+    """Whose values the node's are."""
+
+    slug: str
+    description: Description
+
+
+@dataclass(slots=True)
+class _Node:
+    values: dict[Address, bytes] = field(default_factory=dict)
+    seen: dict[Address, Seen] = field(default_factory=dict)
+    failed: dict[Address, str] = field(default_factory=dict)
+    empty: set[Address] = field(default_factory=set)
+
+    def take(self, record: SdoSeen) -> None:
+        """One finished transfer."""
+        address = record.address
+        if record.outcome is Outcome.DONE and record.data is not None:
+            self._forget(address)
+            self.values[address] = record.data
+            self.seen[address] = Seen(record.t_ns, record.access, record.client is Direction.TX)
+        elif record.access is SdoAccess.WRITE and record.outcome is not Outcome.ABORTED:
+            self._forget(address)
+            self.failed[address] = UNFINISHED
+        elif record.access is SdoAccess.READ and record.outcome is Outcome.ABORTED:
+            if record.abort_code == Abort.NO_DATA:
+                self._forget(address)
+                self.empty.add(address)
+            elif address not in self.values:
+                self.failed[address] = f"abort {record.abort_code or 0:08X}h"
+
+    def doubt(self, why: Doubt) -> None:
+        """Whatever is known now is in doubt from here on."""
+        self.seen = {address: one if one.doubt else replace(one, doubt=why) for address, one in self.seen.items()}
+
+    def _forget(self, address: Address) -> None:
+        for known in (self.values, self.seen, self.failed):
+            known.pop(address, None)
+        self.empty.discard(address)
+
+
+def recover_sets(
+    path: Path, described: Mapping[str, Description], named: Mapping[int, Named] | None = None
+) -> Recovered:
+    """The sets of one recording file. Takes a while for a long one. Raises RecordingError.
+
+    ``described`` are descriptions by id; ``named`` tells what nodes are, and goes before what the recording tells.
+    """
+    try:
+        with open_recording(path) as recording:
+            who = _nodes_of(recording, described, named or {})
+            nodes = _follow(recording)
+            sets, nameless = [], {}
+            for (bus, number), node in sorted(nodes.items()):
+                name = who.get((bus, number)) or (named or {}).get(number)
+                if name is not None and (node.values or node.failed):
+                    sets.append(_set_of(recording, bus, number, node, name))
+                elif node.values:
+                    nameless[bus, number] = len(node.values)
+            return Recovered(tuple(one for one in sets if one.parameters.values), nameless, len(recording.damages))
+    except OSError as error:
+        raise RecordingError(file=str(path), offset=0, reason=error.strerror or str(error)) from error
+
+
+def _nodes_of(
+    recording: Recording, described: Mapping[str, Description], named: Mapping[int, Named]
+) -> dict[tuple[str, int], Named]:
+    """What the recording says of its nodes (``can0/11`` = slug and description), where the description is known."""
+    found = {}
+    for key, text in recording.info.nodes.items():
+        bus, _, number = key.rpartition("/")
+        slug, _, description = text.rpartition(" ")
+        if number.isdecimal() and description in described and int(number) not in named:
+            found[bus, int(number)] = Named(slug, described[description])
+    return found
+
+
+def _follow(recording: Recording) -> dict[tuple[str, int], _Node]:
+    decoders: dict[str, CanOpenDecoder] = {}
+    nodes: dict[tuple[str, int], _Node] = {}
+    gaps = deque(event for event in recording.events() if event.kind in _GAPS)
+    for frame in recording.frames():
+        while gaps and gaps[0].t_ns <= frame.t_ns:
+            _gap(decoders, nodes, gaps.popleft())
+        if not isinstance(frame.payload, Can):
+            continue
+        decoder = decoders.get(frame.bus)
+        if decoder is None:
+            decoder = decoders[frame.bus] = CanOpenDecoder(frame.bus)
+        for record in decoder.feed(frame):
+            _take(nodes, record)
+    for event in gaps:
+        _gap(decoders, nodes, event)
+    return nodes
+
+
+def _gap(decoders: Mapping[str, CanOpenDecoder], nodes: dict[tuple[str, int], _Node], event: Event) -> None:
+    """Frames are missing: transfers that were open are lost, and every value is in doubt. "" is any bus."""
+    for bus, decoder in decoders.items():
+        if event.bus in ("", bus):
+            for record in decoder.gap(event.t_ns, event.kind.value):
+                _take(nodes, record)
+            for (on_bus, _), node in nodes.items():
+                if on_bus == bus:
+                    node.doubt(Doubt.GAP)
+
+
+def _take(nodes: dict[tuple[str, int], _Node], record: Record) -> None:
+    if isinstance(record, SdoSeen):
+        nodes.setdefault((record.bus, record.node), _Node()).take(record)
+    elif isinstance(record, BootUpSeen) and (record.bus, record.node) in nodes:
+        nodes[record.bus, record.node].doubt(Doubt.BOOT_UP)
+
+
+def _set_of(recording: Recording, bus: str, number: int, node: _Node, name: Named) -> RecoveredSet:
+    entries = name.description.entries
+    values: dict[Address, Raw] = {
+        address: decode(entries[address], data) for address, data in sorted(node.values.items()) if address in entries
+    }
+    seen = {address: node.seen[address] for address in values}
+    empty = tuple(sorted(address for address in node.empty if address in entries))
+    readable = [entry.address for entry in name.description if entry.access.readable]
+    missing = {address: node.failed.get(address, NOT_SEEN) for address in readable}
+    unread = {address: why for address, why in missing.items() if address not in values and address not in empty}
+    last_ns = max((one.t_ns for one in seen.values()), default=0)
+    written = sum(one.access is SdoAccess.WRITE for one in seen.values())
+    origin = Origin(
+        turbine=name.slug.partition("/")[0],
+        device=name.slug,
+        node=number,
+        time=iso_time(last_ns),
+        person=recording.info.who,
+        reason=f"{recording.path.name}: {len(seen) - written} read, {written} written",
+        tool=f"hubside {__version__}",
+    )
+    parameters = ParameterSet(
+        name.description.id, name.description.version, identity_of(values), origin, values, unread, empty
+    )
+    unknown = tuple(sorted(address for address in node.values if address not in entries))
+    return RecoveredSet(bus, parameters, seen, unknown)
