@@ -100,8 +100,8 @@ class Bench:
         """
         turbine = self.sites.turbine(slug)
         descriptions = self.sites.describe(turbine)
-        self.restores.require_idle()
         async with self._changing:
+            self.restores.require_idle()
             await self._end(person)
             found = await with_bitrates(turbine, self.options.listen_s)
             journal = self.journal.by(person)
@@ -138,8 +138,8 @@ class Bench:
 
     async def end_visit(self, reason: str, work_order: str, person: str) -> Visit:
         """End the visit with the values as left, and the connection with it. Raises NoVisitError, StoreError."""
-        self.restores.require_idle()
         async with self._changing:
+            self.restores.require_idle()
             visits = self.office.visits
             visits.require()
             if self.connection is not None:
@@ -153,8 +153,8 @@ class Bench:
 
         Raises RestoreOpenError while a restore runs.
         """
-        self.restores.require_idle()
         async with self._changing:
+            self.restores.require_idle()
             await self._end(person)
 
     async def close(self) -> None:

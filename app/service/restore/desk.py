@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from app.errors import (
-    HubsideError,
     MotorUnknownError,
     RestoreChangedError,
     RestoreOpenError,
@@ -147,11 +146,14 @@ class Desk:
 
     # -- decide -------------------------------------------------------------------------
 
-    def confirm(self, restore_id: str, person: str) -> None:
-        """The person agrees to what stands in RAM. Raises RestoreStateError where that is not awaited any more."""
+    async def confirm(self, restore_id: str, person: str) -> None:
+        """The person agrees to what stands in RAM.
+
+        Raises RestoreStateError where that is not awaited any more, RestoreUnknownError.
+        """
         transaction = self.at_work(restore_id)
         if transaction is None or not transaction.confirm(person):
-            raise self._wrong_state(restore_id)
+            raise self._wrong_state((await self.get(restore_id)).row)
         station = self._open[restore_id].station
         self._journal.by(person).note(Kind.RESTORE_CONFIRMED, None, station=station, restore=restore_id)
 
@@ -177,7 +179,7 @@ class Desk:
     ) -> tuple[Kept, Transaction]:
         kept = await self.get(restore_id)
         if self.running is not None or kept.row.state is not RestoreState.INCOMPLETE:
-            raise self._wrong_state(restore_id, kept.row)
+            raise self._wrong_state(kept.row)
         if connection is None or connection.turbine.slug != kept.row.turbine:
             raise UsageError(reason=f"connect to {kept.row.turbine} first: the restore is of {kept.row.station}")
         slugs = {one["slug"] for one in kept.details["devices"]}
@@ -187,13 +189,8 @@ class Desk:
         self._journal.by(person).note(kind, None, station=kept.row.station, restore=restore_id)
         return kept, self._transaction(connection, kept, person, targets)
 
-    def _wrong_state(self, restore_id: str, row: RestoreRow | None = None) -> HubsideError:
-        found = row or self._open.get(restore_id)
-        if found is None:
-            return RestoreUnknownError(restore=restore_id)
-        running = self.at_work(restore_id)
-        state = found.state if running is None else running.state
-        return RestoreStateError(restore=restore_id, state_key=state.text_key)
+    def _wrong_state(self, row: RestoreRow) -> RestoreStateError:
+        return RestoreStateError(restore=row.id, station=row.station, state_key=row.state.text_key)
 
     # -- run ----------------------------------------------------------------------------
 

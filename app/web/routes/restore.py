@@ -61,7 +61,7 @@ async def restore(bench: BenchOf, restore_id: str) -> RestoreDoc:
 @router.post("/live/restores/{restore_id}/confirm", dependencies=[needs(Role.TECHNICIAN)])
 async def confirm_restore(bench: BenchOf, person: PersonOf, restore_id: str, _request: Nothing) -> RestoreDoc:
     """Agree to what stands in RAM: it is saved then."""
-    bench.restores.confirm(restore_id, person.person)
+    await bench.restores.confirm(restore_id, person.person)
     return await _doc(bench, restore_id)
 
 

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import sqlite3
 from collections.abc import AsyncIterator, Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from contextlib import closing
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from app.drivers.contract import LinkState
 from app.model.address import Address, parse_address
 from app.model.datatypes import Raw
+from app.model.description_file import load_builtin
 from app.model.sets import ParameterSet
 from app.service.backup import read_device, to_set
 from app.service.connection import Connection
@@ -19,10 +22,16 @@ from app.service.office.office import Office
 from app.service.restore.desk import Desk
 from app.service.restore.order import Given, Order, Timing
 from app.service.restore.transaction import End
+from app.store.restore_rows import RestoreState
 from app.store.store import Store
-from tests.service.conftest import Served, connection, served
+from app.twins.line import CanLine
+from app.twins.line_thread import LineThread
+from app.twins.socketcand_server import SocketcandServer
+from app.twins.turbine import Settings, Turbine
+from tests.service.conftest import MS, Served, connection
+from tests.web.rig import wait_until
 
-__all__ = ["connection", "served"]
+__all__ = ["connection"]
 
 STATION = "wtg-07/blade-1"
 PMM, PMC = f"{STATION}/pmm", f"{STATION}/pmc"
@@ -34,6 +43,13 @@ CHANGES: dict[str, dict[str, int]] = {
 """What the sets of these tests hold other than the devices do."""
 
 
+def changed(parameters: ParameterSet, changes: Mapping[str, Raw]) -> ParameterSet:
+    """The set with other values."""
+    return replace(
+        parameters, values={**parameters.values, **{parse_address(one): raw for one, raw in changes.items()}}
+    )
+
+
 @dataclass
 class Bench:
     """What a restore needs: the desk, the connection, and the data folder that outlives both."""
@@ -42,19 +58,23 @@ class Bench:
     connection: Connection
     office: Office
     served: Served
+    data: Path
+    read: dict[str, ParameterSet] = field(default_factory=dict)
+    """As they were when a test ordered first."""
 
-    async def set_of(self, slug: str, changes: Mapping[str, Raw] | None = None) -> ParameterSet:
-        """The set of a device as it is, with ``changes``."""
+    async def set_of(self, slug: str) -> ParameterSet:
+        """The set of a device as it is."""
         target = self.connection.target(slug)
         report = await read_device(self.connection.driver(target), target)
-        found = to_set(report, "wtg-07", "Anna", "backup", 0)
-        changed = {parse_address(address): raw for address, raw in (changes or {}).items()}
-        return replace(found, values={**found.values, **changed})
+        return to_set(report, "wtg-07", "Anna", "backup", 0)
 
     async def order(self, changes: Mapping[str, Mapping[str, Raw]] | None = None, **options: Any) -> Order:
         """An order of the station's sets with ``changes`` in them, confirmed already."""
         wanted = CHANGES if changes is None else changes
-        given = {slug: Given(await self.set_of(slug, own)) for slug, own in wanted.items()}
+        for slug in wanted:
+            if slug not in self.read:
+                self.read[slug] = await self.set_of(slug)
+        given = {slug: Given(changed(self.read[slug], own)) for slug, own in wanted.items()}
         usual: dict[str, Any] = {"person": "Anna", "confirm_s": None, "reason": "test", "work_order": "WO-1"}
         return Order(STATION, given, **{**usual, **options})
 
@@ -74,6 +94,33 @@ class Bench:
         report = await read_device(self.connection.driver(target), target, (parse_address(address),))
         return report.values[parse_address(address)]
 
+    async def until_state(self, restore_id: str, state: RestoreState) -> None:
+        """Until it is in ``state``."""
+
+        def there() -> bool:
+            transaction = self.desk.at_work(restore_id)
+            return transaction is not None and transaction.state is state
+
+        await wait_until(there)
+
+    async def until_connected(self) -> None:
+        """Until the bus is back after a cut."""
+        await wait_until(lambda: self.connection.buses["can0"].status.state is LinkState.CONNECTED)
+
+    def another_desk(self, timing: Timing | None = None) -> Desk:
+        """A desk as the next run of the tool makes it."""
+        desk = Desk(self.office, self.connection.journal, self.connection.stamper, timing or QUICK)
+        self.connection.gate.blocks = desk.blocks
+        return desk
+
+    def intent_on_disk(self, mux: bytes) -> bool:
+        """Whether another reader of the store finds an open intent for the object."""
+        index = int.from_bytes(mux[:2], "little")
+        with closing(sqlite3.connect(f"{(self.data / 'store.sqlite3').as_uri()}?mode=ro", uri=True)) as file:
+            rows = file.execute("SELECT kind, address FROM restore_steps WHERE state = 'intended'").fetchall()
+        address = "save" if index == 0x1010 else f"{index:04X}:{mux[2]:02X}"
+        return [kind if at is None else at for kind, at in rows] == [address]
+
     def stored(self, slug: str, address: str) -> bytes | None:
         """What the twin's memory holds; None where it holds the default."""
         node = self.connection.target(slug).node
@@ -81,14 +128,16 @@ class Bench:
         return self.served.turbine.devices[node].memory.memory.saved.get(at)
 
 
-@contextmanager
-def office_of(folder: Path, connection: Connection) -> Iterator[Office]:
-    """The office of a data folder, as a server has it; closed at the end without waiting for its audit."""
-    office = Office(Store.open(folder), connection.journal, connection.stamper, "tester")
-    try:
-        yield office
-    finally:
-        office.store.close()
+@pytest.fixture
+def served() -> Iterator[Served]:
+    """Six devices that answer, boot and save quickly: a restore reads each of them several times."""
+    line = CanLine(1_000_000)
+    settings = Settings(turnaround_ns=MS // 10, boot_ns=50 * MS, save_ns=50 * MS)
+    turbine = Turbine(line, load_builtin("oat-pmm"), load_builtin("oat-pmc"), settings)
+    turbine.power_on(line.now_ns)
+    with LineThread(line) as thread, SocketcandServer(thread) as server:
+        yield Served(line, thread, turbine, f"socketcand:127.0.0.1:{server.port}", server)
+    assert thread.handler_errors == 0
 
 
 @pytest.fixture
@@ -98,7 +147,7 @@ async def bench(connection: Connection, served: Served, tmp_path: Path) -> Async
     desk = Desk(office, connection.journal, connection.stamper, QUICK)
     connection.gate.blocks = desk.blocks
     try:
-        yield Bench(desk, connection, office, served)
+        yield Bench(desk, connection, office, served, tmp_path / "data")
     finally:
         await desk.close()
         await office.close()

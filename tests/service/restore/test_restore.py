@@ -2,20 +2,302 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+
+from app.errors import RestoreChangedError, RestoreOpenError, RestoreStateError
+from app.model.address import parse_address
+from app.model.fault import FaultOrder
+from app.service.restore.order import Cause
 from app.service.restore.transaction import End
-from app.store.restore_rows import RestoreState
-from tests.service.restore.conftest import CHANGES, Bench
+from app.service.save import restart, save
+from app.service.stop import Command, command_all
+from app.service.write import write_raw
+from app.store.restore_rows import Direction, RestoreState, StepState, peek_open
+from app.twins.faults import Instructor
+from app.twins.line import Fault, drop
+from app.twins.object_store import RefusedAccessError
+from app.wire.frame import Can
+from app.wire.sdo import Abort
+from tests.service.conftest import Served
+from tests.service.restore.conftest import CHANGES, PMC, PMM, QUICK, Bench
+
+ACKNOWLEDGE = 0x60
+
+
+def new_values() -> dict[tuple[str, str], int]:
+    return {(slug, address): raw for slug, own in CHANGES.items() for address, raw in own.items()}
+
+
+async def ram(bench: Bench) -> dict[tuple[str, str], object]:
+    return {(slug, address): await bench.ram(slug, address) for slug, address in new_values()}
+
+
+def download_of(node: int, address: str) -> Callable[[Can], bool]:
+    at = parse_address(address)
+    mux = at.major.to_bytes(2, "little") + bytes((at.minor,))
+    return lambda can: can.can_id == 0x600 + node and can.data[0] >> 5 == 1 and can.data[1:4] == mux
+
+
+def answer_to(node: int, address: str) -> Callable[[Can], bool]:
+    at = parse_address(address)
+    mux = at.major.to_bytes(2, "little") + bytes((at.minor,))
+    return lambda can: can.can_id == 0x580 + node and can.data[0] == ACKNOWLEDGE and can.data[1:4] == mux
 
 
 async def test_a_restore_writes_saves_and_proves_the_station(bench: Bench) -> None:
-    before = {(slug, address): await bench.ram(slug, address) for slug, own in CHANGES.items() for address in own}
+    before = await ram(bench)
     restore_id, end = await bench.run(restart=True)
     kept = await bench.desk.get(restore_id)
     assert end is End.NEW, kept.outcome
     assert kept.row.state is RestoreState.DONE and kept.outcome["proven"] is True
-    for slug, own in CHANGES.items():
-        for address, raw in own.items():
-            assert await bench.ram(slug, address) == raw != before[slug, address]
-            stored = bench.stored(slug, address)
-            assert stored is not None and int.from_bytes(stored, "little") == raw
+    assert await ram(bench) == new_values() != before
+    for (slug, address), raw in new_values().items():
+        stored = bench.stored(slug, address)
+        assert stored is not None and int.from_bytes(stored, "little") == raw
     assert bench.desk.open == ()
+    assert {step.state for step in kept.steps} == {StepState.DONE}
+    assert [step.kind for step in kept.steps] == ["write"] * 5 + ["save"] * 2 + ["restart"] * 2 + ["prove"] * 2
+
+
+async def test_without_a_restart_it_is_saved_and_not_yet_proven(bench: Bench) -> None:
+    restore_id, end = await bench.run()
+    assert end is End.NEW
+    assert (await bench.desk.get(restore_id)).outcome["proven"] is False
+
+
+async def test_old_and_new_values_and_the_undo_set_are_kept_for_good(bench: Bench) -> None:
+    before = await ram(bench)
+    restore_id, _ = await bench.run()
+    kept = await bench.desk.get(restore_id)
+    assert {place.slug for place in kept.goals} == {PMM, PMC}
+    for device in kept.details["devices"]:
+        undo = await bench.office.library.get(device["before"]["record"])
+        for (slug, address), raw in before.items():
+            if slug == device["slug"]:
+                assert undo.values[parse_address(address)] == raw
+
+
+async def test_each_intent_is_on_the_disk_before_its_write_leaves(bench: Bench, served: Served) -> None:
+    """At the instant of every write and save another reader of the store finds its intent there."""
+    seen: list[bool] = []
+    path = bench.data / "store.sqlite3"
+
+    def look(can: Can) -> bool:
+        if can.can_id in (0x601, 0x60B) and can.data[0] >> 5 == 1:
+            seen.append(bool(peek_open(path)) and bench.intent_on_disk(can.data[1:4]))
+        return False
+
+    served.spoil(Fault(look, drop, None))
+    _, end = await bench.run()
+    assert end is End.NEW
+    assert seen == [True] * 7
+
+
+async def test_a_refused_value_rolls_everything_back_by_itself(bench: Bench, served: Served) -> None:
+    before = await ram(bench)
+    blade = served.turbine.blades[0].pmc.device.store
+    blade.cell(0x5683).guard = _refuse
+    restore_id, end = await bench.run()
+    kept = await bench.desk.get(restore_id)
+    assert (end, kept.outcome["cause"]) == (End.OLD, Cause.DEVICE_REFUSED.value)
+    assert kept.outcome["error"]["code"] == "sdo_abort"
+    assert await ram(bench) == before
+    assert bench.desk.open == () and not kept.saves_begun
+    assert any(step.direction is Direction.BACK for step in kept.steps)
+
+
+def _refuse(raw: object) -> None:
+    if raw == 1400:
+        raise RefusedAccessError(Abort.VALUE_RANGE)
+
+
+async def test_a_lost_acknowledge_is_settled_by_reading_and_nothing_is_written_twice(
+    bench: Bench, served: Served
+) -> None:
+    writes: list[Can] = []
+
+    def note(can: Can) -> bool:
+        if download_of(11, "6065")(can):
+            writes.append(can)
+        return False
+
+    served.spoil(Fault(note, drop, None))
+    served.spoil(Fault(answer_to(11, "6065"), drop))
+    _, end = await bench.run()
+    assert end is End.NEW and len(writes) == 1
+
+
+async def test_nobody_confirms_and_the_old_values_come_back(bench: Bench) -> None:
+    before = await ram(bench)
+    restore_id = await bench.begin(confirm_s=0.3)
+    assert await bench.desk.wait(restore_id) is End.OLD
+    assert (await bench.desk.get(restore_id)).outcome["cause"] == Cause.NOT_CONFIRMED.value
+    assert await ram(bench) == before
+    with pytest.raises(RestoreStateError):
+        await bench.desk.confirm(restore_id, "Anna")
+
+
+async def test_a_person_confirms_what_stands_in_ram(bench: Bench) -> None:
+    restore_id = await bench.begin(confirm_s=30.0)
+    await bench.until_state(restore_id, RestoreState.AWAITING_CONFIRMATION)
+    transaction = bench.desk.at_work(restore_id)
+    assert transaction is not None and transaction.left_s is not None and 25 < transaction.left_s <= 30
+    assert await ram(bench) == new_values()
+    assert bench.stored(PMM, "3110:01") is None, "nothing is saved before"
+    await bench.desk.confirm(restore_id, "Berta")
+    assert await bench.desk.wait(restore_id) is End.NEW
+    assert (await bench.desk.get(restore_id)).outcome["confirmed_by"] == "Berta"
+
+
+async def test_a_person_wants_the_old_values(bench: Bench) -> None:
+    before = await ram(bench)
+    restore_id = await bench.begin(confirm_s=30.0)
+    await bench.until_state(restore_id, RestoreState.AWAITING_CONFIRMATION)
+    await bench.desk.roll_back(bench.connection, restore_id, "Berta")
+    assert await bench.desk.wait(restore_id) is End.OLD
+    assert await ram(bench) == before
+
+
+async def test_the_gate_is_shut_while_it_is_open_and_opens_at_its_end(bench: Bench) -> None:
+    connection = bench.connection
+    target, other = connection.target(PMM), connection.target("wtg-07/blade-2/pmm")
+    restore_id = await bench.begin(confirm_s=30.0)
+    await bench.until_state(restore_id, RestoreState.AWAITING_CONFIRMATION)
+    driver, journal, stamper = connection.driver(target), connection.journal, connection.stamper
+    for attempt in (
+        lambda: write_raw(driver, target, parse_address("3110:01"), 480, journal),
+        lambda: save(driver, target, journal, stamper),
+        lambda: restart(driver, target, journal, stamper),
+    ):
+        with pytest.raises(RestoreOpenError):
+            await attempt()
+    assert (await write_raw(driver, other, parse_address("3110:01"), 480, journal)).verified, "another station goes on"
+    await bench.desk.roll_back(connection, restore_id, "Anna")
+    await bench.desk.wait(restore_id)
+    assert (await write_raw(driver, target, parse_address("3110:01"), 480, journal)).verified
+
+
+async def test_a_pulled_cable_leaves_it_incomplete_and_both_ways_lead_out(bench: Bench, served: Served) -> None:
+    before = await ram(bench)
+    for goal, after in ((End.OLD, before), (End.NEW, new_values())):
+        served.spoil(Fault(download_of(11, "6065"), _cut(served)))
+        restore_id, end = await bench.run()
+        assert end is End.INCOMPLETE
+        assert (await bench.desk.get(restore_id)).outcome["cause"] == Cause.BUS_LOST.value
+        assert [row.id for row in bench.desk.open] == [restore_id]
+        await bench.until_connected()
+        order = bench.desk.roll_back if goal is End.OLD else bench.desk.resume
+        await order(bench.connection, restore_id, "Berta")
+        assert await bench.desk.wait(restore_id) is goal
+        assert await ram(bench) == after
+        assert bench.desk.open == ()
+
+
+def _cut(served: Served) -> Callable[[Can], list[tuple[int, Can]]]:
+    def act(_can: Can) -> list[tuple[int, Can]]:
+        served.cut()
+        return []
+
+    return act
+
+
+@pytest.mark.parametrize("address", ["6065", "5683"])
+async def test_a_device_that_lost_power_is_brought_back_to_the_old_values(
+    bench: Bench, served: Served, address: str
+) -> None:
+    before = await ram(bench)
+    instructor = Instructor(served.turbine, served.line)
+
+    def cut(_can: Can) -> list[tuple[int, Can]]:
+        instructor.inject(FaultOrder("power_cut", node=11, values={"off_s": 0.2}))
+        return []
+
+    served.spoil(Fault(download_of(11, address), cut))
+    restore_id, end = await bench.run()
+    kept = await bench.desk.get(restore_id)
+    assert end is End.OLD, kept.outcome
+    assert await ram(bench) == before
+
+
+async def test_a_power_cut_while_saving_ends_old_with_the_memory_written_again(bench: Bench, served: Served) -> None:
+    before = await ram(bench)
+    instructor = Instructor(served.turbine, served.line)
+
+    def cut(can: Can) -> list[tuple[int, Can]]:
+        instructor.inject(FaultOrder("power_cut", node=1, values={"off_s": 0.2}))
+        return [(0, can)]
+
+    served.spoil(Fault(download_of(1, "1010:03"), cut))
+    restore_id, end = await bench.run(restart=True)
+    kept = await bench.desk.get(restore_id)
+    assert end is End.OLD, kept.outcome
+    assert kept.outcome["cause"] == Cause.SAVE_FAILED.value
+    assert await ram(bench) == before
+    back = [step for step in kept.steps if step.direction is Direction.BACK]
+    assert "save" in {step.kind for step in back}
+
+
+async def test_a_tool_that_ends_leaves_it_open_for_the_next_one(bench: Bench) -> None:
+    before = await ram(bench)
+    restore_id = await bench.begin(confirm_s=30.0)
+    await bench.until_state(restore_id, RestoreState.AWAITING_CONFIRMATION)
+    await bench.desk.close()
+    kept = await bench.desk.get(restore_id)
+    assert (kept.row.state, kept.outcome["cause"]) == (RestoreState.INCOMPLETE, Cause.TOOL_ENDED.value)
+    again = bench.another_desk()
+    assert [row.id for row in again.open] == [restore_id]
+    await again.roll_back(bench.connection, restore_id, "Berta")
+    assert await again.wait(restore_id) is End.OLD
+    assert await ram(bench) == before
+
+
+async def test_an_axis_that_is_driven_meanwhile_ends_the_writing(bench: Bench) -> None:
+    """FEATHER goes through, and the restore gives way; how long it waits for the axis is limited."""
+    connection = bench.connection
+    bench.desk = bench.another_desk(replace(QUICK, quiet_s=0.1))
+    restore_id = await bench.begin(confirm_s=30.0)
+    await bench.until_state(restore_id, RestoreState.AWAITING_CONFIRMATION)
+    sent = await command_all(connection.axes(), Command.FEATHER, connection.journal, connection.stamper)
+    assert all(one.error is None for one in sent)
+    await bench.desk.confirm(restore_id, "Anna")
+    assert await bench.desk.wait(restore_id) is End.INCOMPLETE
+    kept = await bench.desk.get(restore_id)
+    assert (kept.outcome["cause"], kept.saves_begun) == (Cause.DRIVE_ENABLED.value, frozenset())
+    await command_all(connection.axes(), Command.STOP, connection.journal, connection.stamper)
+    bench.desk = bench.another_desk()
+    await bench.desk.resume(connection, restore_id, "Anna")
+    assert await bench.desk.wait(restore_id) is End.NEW
+
+
+async def test_another_masters_write_is_not_saved(bench: Bench) -> None:
+    restore_id = await bench.begin(confirm_s=30.0)
+    await bench.until_state(restore_id, RestoreState.AWAITING_CONFIRMATION)
+    target = bench.connection.target(PMM)
+    await bench.connection.driver(target).write(1, parse_address("30FC:02"), (652).to_bytes(2, "little"))
+    await bench.desk.confirm(restore_id, "Anna")
+    assert await bench.desk.wait(restore_id) is End.OLD
+    kept = await bench.desk.get(restore_id)
+    assert (kept.outcome["cause"], kept.saves_begun) == (Cause.CHANGED.value, frozenset())
+    assert kept.outcome["cause_details"] == {"differing": "30FC:02"}
+
+
+async def test_a_plan_that_nobody_looked_at_is_not_begun(bench: Bench) -> None:
+    prepared = await bench.desk.prepare(bench.connection, await bench.order())
+    target = bench.connection.target(PMM)
+    await write_raw(bench.connection.driver(target), target, parse_address("3110:01"), 480, bench.connection.journal)
+    anew = await bench.desk.prepare(bench.connection, await bench.order())
+    assert anew.hash != prepared.hash
+    with pytest.raises(RestoreChangedError):
+        await bench.desk.begin(bench.connection, anew, prepared.hash)
+    assert bench.desk.open == ()
+
+
+async def test_one_at_a_time(bench: Bench) -> None:
+    restore_id = await bench.begin(confirm_s=30.0)
+    with pytest.raises(RestoreOpenError):
+        await bench.desk.prepare(bench.connection, await bench.order())
+    await bench.desk.roll_back(bench.connection, restore_id, "Anna")
+    await bench.desk.wait(restore_id)
