@@ -157,8 +157,8 @@ def checked(description: Description, draft: Draft) -> Draft:
     Raises MotorFieldError.
     """
     maker, kind = checked_name("maker", draft.maker), checked_name("type", draft.type)
-    remarks = draft.remarks.strip()
-    if len(remarks) > LONGEST_REMARKS:
+    remarks = "\n".join(draft.remarks.strip().splitlines())
+    if len(remarks) > LONGEST_REMARKS or not all(one.isprintable() or one in "\n\t" for one in remarks):
         raise flaw("remarks", "long", maximum=str(LONGEST_REMARKS))
     check_values(description, draft.values)
     return Draft(maker, kind, checked_plate(draft.plate), dict(sorted(draft.values.items())), remarks)

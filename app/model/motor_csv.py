@@ -87,8 +87,8 @@ def _shown(description: Description, entry: Entry, values: Mapping[Address, int]
 
 
 def _harmless(cell: str) -> str:
-    """What a spreadsheet would take for a formula is kept from it by an apostrophe."""
-    return f"'{cell}" if cell.startswith(_FORMULA) else cell
+    """What a spreadsheet would take for a formula is kept from it by an apostrophe; so is an apostrophe of its own."""
+    return f"'{cell}" if cell.startswith(("'", *_FORMULA)) else cell
 
 
 def read_motors(description: Description, data: bytes, file: str) -> list[FileRow]:
@@ -240,5 +240,5 @@ def _unit(entry: Entry) -> str:
 
 
 def _unmarked(cell: str) -> str:
-    """Without the apostrophe that we put before what looks like a formula."""
-    return cell[1:] if cell.startswith("'") and cell[1:].startswith(_FORMULA) else cell
+    """Without the apostrophe that ``_harmless`` put before it."""
+    return cell[1:] if cell.startswith("'") and cell[1:].startswith(("'", *_FORMULA)) else cell
