@@ -76,3 +76,13 @@ async def test_blades_stand_side_by_side_and_what_is_bound_to_one_is_set_apart(s
         ("oat-pmc", [1, 2, 3]),
     ]
     assert all(len(row["cells"]) == 3 for part in doc["parts"] for row in part["comparison"]["rows"])
+
+
+async def test_a_rule_that_a_column_breaks_is_told_at_its_row(server: Server) -> None:
+    """The DC link's minimum must stay below its maximum: what is pending would break that."""
+    highest = row(await compared(server, f"live:{PMM}", f"live:{PMM}"), "30FA:02")["cells"][0]["raw"]
+    doc = await compared(server, f"live:{PMM}", f"editor:{PMM}", pending={PMM: {"30FA:01": highest + 100}})
+    told = row(doc, "30FA:01")
+    assert told["findings"], "no rule notices"
+    assert all(numbers == [1] for numbers in told["found_in"].values())
+    assert list(told["found_in"]) == told["findings"]

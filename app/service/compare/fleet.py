@@ -116,7 +116,7 @@ class Fleet:
 
 
 async def compare_fleet(columns: Columns, store: Store, golden: str) -> Fleet:
-    """Compare the latest set of every device with the column ``golden``, such as ``golden:oat-pmc`` or ``set:0195f3a2``.
+    """Compare the latest set of every device with a column, such as ``golden:oat-pmc`` or ``set:0195f3a2``.
 
     Raises ColumnError, StoreError.
     """

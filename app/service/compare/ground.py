@@ -10,6 +10,7 @@ from app.model.description import Description
 from app.model.description_file import BUILTIN, load_builtin
 from app.model.sets import ParameterSet
 from app.model.site import Device
+from app.model.station import station_slug
 from app.service.bench import Bench
 from app.service.devices import Target
 from app.service.library.library import Library
@@ -47,6 +48,13 @@ class Ground:
                 if device.slug == slug and self.sites is not None:
                     return device, self.sites.describe(turbine)[device.description_id]
         return None
+
+    def partners(self, slug: str) -> tuple[str, ...]:
+        """The other devices of its station."""
+        turbines = () if self.sites is None else self.sites.turbines.values()
+        known = [target.slug for target in self.targets] + [one.slug for each in turbines for one in each.devices]
+        station = station_slug(slug)
+        return tuple(dict.fromkeys(one for one in known if one != slug and station_slug(one) == station))
 
     def description(self, description_id: str) -> Description | None:
         """What describes that kind of device: what the connected ones have, the sites', else one of ours."""

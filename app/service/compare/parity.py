@@ -42,7 +42,7 @@ async def compare_blades(
             except ColumnError:
                 without.append(blade)
         if len(shown) > 1:
-            compared = compare_shown([one for _blade, one in shown], everything)
+            compared = await compare_shown(columns, [one for _blade, one in shown], everything=everything)
             name = compared.columns[0].column.description.name
             blades = tuple(blade for blade, _one in shown)
             parts.append(Part(description_id, name, blades, tuple(without), compared))

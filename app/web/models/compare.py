@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -140,7 +141,8 @@ class CompareRow(BaseModel):
     """One address, a cell for each column. ``group`` is a key below ``group.``; ``restore`` its class.
 
     ``rescaled``: equal raw values stand for other quantities, because what their unit rests on differs.
-    ``findings``: ids of the rules that are broken here, in any column.
+    ``findings``: ids of the rules that are broken here in any column, the gravest first; ``found_in``: the columns of
+    each, counted from 0.
     """
 
     address: str
@@ -152,9 +154,10 @@ class CompareRow(BaseModel):
     cells: list[CellDoc]
     bits: list[BitDoc]
     findings: list[str]
+    found_in: dict[str, list[int]]
 
     @classmethod
-    def of(cls, row: Row) -> CompareRow:
+    def of(cls, row: Row, findings: Mapping[str, Sequence[int]]) -> CompareRow:
         """As the page gets it."""
         return cls(
             address=row.address.short,
@@ -165,7 +168,8 @@ class CompareRow(BaseModel):
             rescaled=row.rescaled,
             cells=[CellDoc.of(cell) for cell in row.cells],
             bits=[BitDoc.of(bit) for bit in row.bits],
-            findings=[],
+            findings=list(findings),
+            found_in={rule: list(numbers) for rule, numbers in findings.items()},
         )
 
 
@@ -199,6 +203,6 @@ class ComparisonDoc(BaseModel):
         """As the page gets it."""
         return cls(
             columns=[ColumnDoc.of(one) for one in compared.columns],
-            rows=[CompareRow.of(row) for row in compared.comparison.rows],
+            rows=[CompareRow.of(row, compared.findings.get(row.address, {})) for row in compared.comparison.rows],
             summary=SummaryDoc.of(compared.comparison.summary),
         )

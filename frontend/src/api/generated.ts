@@ -2336,7 +2336,8 @@ export interface components {
          * @description One address, a cell for each column. ``group`` is a key below ``group.``; ``restore`` its class.
          *
          *     ``rescaled``: equal raw values stand for other quantities, because what their unit rests on differs.
-         *     ``findings``: ids of the rules that are broken here, in any column.
+         *     ``findings``: ids of the rules that are broken here in any column, the gravest first; ``found_in``: the columns of
+         *     each, counted from 0.
          */
         CompareRow: {
             /** Address */
@@ -2347,6 +2348,10 @@ export interface components {
             cells: components["schemas"]["CellDoc"][];
             /** Findings */
             findings: string[];
+            /** Found In */
+            found_in: {
+                [key: string]: number[];
+            };
             /** Group */
             group: string;
             /** Name */
