@@ -23,6 +23,8 @@ export interface PageSearch {
   view?: "side";
   /** The review of what is pending is open. */
   review?: "open";
+  /** The list of what the rules find is open. */
+  findings?: "open";
   /** Groups that are closed, separated by commas. */
   closed?: string;
   /** Column, with a minus sign before it where descending. */
@@ -166,6 +168,7 @@ export function readSearch(raw: Record<string, unknown>): PageSearch {
   if (raw.events === "open") search.events = raw.events;
   if (raw.view === "side") search.view = raw.view;
   if (raw.review === "open") search.review = raw.review;
+  if (raw.findings === "open") search.findings = raw.findings;
   for (const name of TEXTS) {
     const text = raw[name];
     if (typeof text === "string" && text !== "") search[name] = text;

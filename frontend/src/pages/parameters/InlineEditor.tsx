@@ -3,9 +3,11 @@ import { type KeyboardEvent, useEffect, useRef, useState } from "react";
 import type { EntryDoc } from "../../api/types";
 import { store } from "../../live/live";
 import { quantityOf, isHex, show } from "../../model/values";
+import { isBroken, lineOfFinding } from "../../model/ruleFindings";
 import type { DeviceContext } from "../../model/shown";
 import { rawOf } from "./cellValue";
 import { useDraft } from "./draft";
+import { useFindingsOf } from "./rules";
 import classes from "./Parameters.module.css";
 import { stage, staged } from "./staging";
 
@@ -23,6 +25,7 @@ export function InlineEditor({ entry, device, onDone }: Props) {
     return raw === null ? "" : show(entry, raw, lookup, t.language);
   });
   const draft = useDraft(entry, device, start);
+  const broken = useFindingsOf(entry, device, draft.raw).find(isBroken);
   const input = useRef<HTMLInputElement>(null);
   useEffect(() => input.current?.select(), []);
   const accept = () => {
@@ -76,9 +79,11 @@ export function InlineEditor({ entry, device, onDone }: Props) {
         id={`inline-note-${entry.address}`}
         className={classes.inlineNote}
         data-error={draft.error !== null}
+        data-rule={draft.error === null && broken !== undefined ? broken.severity : undefined}
         role="status"
       >
-        {draft.error ?? draft.hint}
+        {draft.error ??
+          (broken ? `${t(`rule.${broken.rule}.title`)}: ${lineOfFinding(broken, t)}` : draft.hint)}
       </span>
     </span>
   );

@@ -3,6 +3,7 @@ import { IconArrowRight, IconLock, IconPencilPlus } from "@tabler/icons-react";
 import { useState } from "react";
 import type { EntryDoc, Raw } from "../../api/types";
 import { useCell, useDeviceVersion } from "../../live/live";
+import { usePageSearch } from "../../frame/search";
 import { planOf } from "../../model/findings";
 import type { Lock } from "../../model/locks";
 import { type DeviceContext, lineOf, shownOf } from "../../model/shown";
@@ -14,6 +15,8 @@ import { type Draft, startText, useDraft } from "./draft";
 import { FindingList } from "./FindingList";
 import classes from "./Parameters.module.css";
 import { Places } from "./Places";
+import { RuleFindingList } from "./RuleFindingList";
+import { useFindingsOf } from "./rules";
 import { groundOf, plannedContext, stage, unstage, useChange, useStaged } from "./staging";
 import { ValueEditor } from "./ValueEditor";
 
@@ -58,6 +61,7 @@ export function PanelEditor({ entry }: { entry: EntryDoc }) {
         <ValueEditor entry={entry} draft={draft} />
         <Preview entry={entry} from={rawOf(cell)} to={draft.raw} />
         <Speaks entry={entry} draft={draft} />
+        <RulesSay entry={entry} draft={draft} />
         {siblings.length > 1 && (
           <Checkbox
             label={t("page.stage.all", { count: siblings.length })}
@@ -116,6 +120,20 @@ function Preview({ entry, from, to }: { entry: EntryDoc; from: Raw | null; to: R
         {device.t("page.entry.raw_only", { raw: hex === "" ? to : `${to} · ${hex}` })}
       </span>
     </div>
+  );
+}
+
+/** What the rules of the station say of the draft while it is typed, with all that is pending on all its devices. */
+function RulesSay({ entry, draft }: { entry: EntryDoc; draft: Draft }) {
+  const device = useDevice();
+  const [, update] = usePageSearch();
+  const findings = useFindingsOf(entry, device, draft.raw);
+  return (
+    <RuleFindingList
+      findings={findings}
+      here={{ device: device.slug, address: entry.address }}
+      onJump={(slug, edit) => update({ device: slug, edit, q: undefined })}
+    />
   );
 }
 

@@ -17,6 +17,8 @@ import { useFavourites } from "./favourites";
 import classes from "./Parameters.module.css";
 import { PendingBar } from "./PendingBar";
 import { ReviewDialog } from "./ReviewDialog";
+import { RuleButton, RuleOverview } from "./RuleOverview";
+import { JudgedContext, useJudged } from "./rules";
 import { type Selection, selectionOf } from "./selection";
 import { staged } from "./staging";
 import { useFinishWriting } from "./writing";
@@ -41,27 +43,36 @@ export function ParametersPage() {
   }, [slug]);
   useFinishWriting();
   const error = turbine.error ?? description.error;
+  const judged = useJudged(selection !== null);
   return (
-    <div className={classes.page}>
-      {selection && (
-        <div className={classes.top}>
-          <DevicePicker
-            places={places}
-            selection={selection}
-            onPick={(device, side) => update({ device, view: side ? "side" : undefined })}
-          />
-          <PendingBar />
-        </div>
-      )}
-      {error && <ProblemAlert error={error} title={t("page.table.not_loaded")} />}
-      {selection && description.data && <Room places={places} selection={selection} doc={description.data} />}
-      {turbine.isSuccess && !turbine.data && <Unconnected />}
-      {!error && turbine.data !== undefined && !description.data && (
-        <Center h="60%">
-          <Loader aria-label={t("page.loading")} />
-        </Center>
-      )}
-    </div>
+    <JudgedContext value={judged}>
+      <div className={classes.page}>
+        {selection && (
+          <div className={classes.top}>
+            <DevicePicker
+              places={places}
+              selection={selection}
+              onPick={(device, side) => update({ device, view: side ? "side" : undefined })}
+            />
+            <PendingBar />
+            <RuleButton />
+          </div>
+        )}
+        {error && <ProblemAlert error={error} title={t("page.table.not_loaded")} />}
+        {selection && description.data && (
+          <Room places={places} selection={selection} doc={description.data} />
+        )}
+        {turbine.isSuccess && !turbine.data && <Unconnected />}
+        {!error && turbine.data !== undefined && !description.data && (
+          <Center h="60%">
+            <Loader aria-label={t("page.loading")} />
+          </Center>
+        )}
+        {search.findings === "open" && (
+          <RuleOverview places={places} onClose={() => update({ findings: undefined })} />
+        )}
+      </div>
+    </JudgedContext>
   );
 }
 

@@ -1,10 +1,12 @@
 import { ActionIcon, Alert, Button, Checkbox, Group, SegmentedControl, Stack, Text } from "@mantine/core";
 import { IconArrowRight, IconTrash } from "@tabler/icons-react";
-import { useState } from "react";
+import { useContext, useState } from "react";
 import type { Raw, WritesRequest } from "../../api/types";
+import { usePageSearch } from "../../frame/search";
 import { useDeviceVersion, useWatchDevice } from "../../live/live";
 import { asks, FindingKind, planOf, type PlannedRow, stops } from "../../model/findings";
 import { titleOf } from "../../model/rows";
+import { pendingOf, touching } from "../../model/ruleFindings";
 import { type DeviceContext, lineOf, shownOf } from "../../model/shown";
 import { type Change, keyOf } from "../../model/staged";
 import { useTexts } from "../../texts/texts";
@@ -13,6 +15,8 @@ import { HoldButton } from "../../ui/HoldButton";
 import { useBenchOfTable } from "./context";
 import { useContexts } from "./devicesOf";
 import { FindingList } from "./FindingList";
+import { RuleFindingList } from "./RuleFindingList";
+import { JudgedContext } from "./rules";
 import classes from "./Parameters.module.css";
 import { entriesOf, groundOf, plannedContext, staged, useStaged } from "./staging";
 import { useSilent } from "./silent";
@@ -68,6 +72,7 @@ export function ReviewList({ places, onClose }: { places: readonly Place[]; onCl
           data-testid="on-failure"
         />
       </Group>
+      <RulesOfReview />
       <Blocked stopped={stopped} asked={asked} />
       <Group justify="space-between">
         <Button
@@ -114,6 +119,30 @@ function usePlans(places: readonly Place[]): DevicePlan[] {
       : list.map((change) => ({ change, findings: [] }));
     return { slug, context, rows };
   });
+}
+
+/** What the rules find at the pending objects once all of them were written. It forbids nothing: a person decides. */
+function RulesOfReview() {
+  const t = useTexts();
+  const [, update] = usePageSearch();
+  const { changes } = useStaged();
+  const { stations } = useContext(JudgedContext);
+  const findings = touching(
+    stations.flatMap((one) => one.findings),
+    pendingOf(changes.values()),
+  );
+  if (findings.length === 0) return null;
+  return (
+    <section data-testid="review-rules">
+      <Text size="sm" fw={650} mb={6}>
+        {t("page.rules.review", { count: findings.length })}
+      </Text>
+      <RuleFindingList
+        findings={findings}
+        onJump={(device, edit) => update({ device, edit, review: undefined, q: undefined })}
+      />
+    </section>
+  );
 }
 
 function Nothing({ onClose }: { onClose: () => void }) {

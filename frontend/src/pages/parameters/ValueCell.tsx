@@ -1,9 +1,10 @@
-import { IconPencil } from "@tabler/icons-react";
+import { IconAlertTriangle, IconCircleX, IconInfoCircle, IconPencil } from "@tabler/icons-react";
 import type { EntryDoc, Failure, Raw } from "../../api/types";
 import { useCell } from "../../live/live";
 import type { Cell } from "../../live/store";
 import { lockOf } from "../../model/locks";
 import type { ParameterRow } from "../../model/rows";
+import { lineOfFinding } from "../../model/ruleFindings";
 import { type DeviceContext, lineOf, shownOf } from "../../model/shown";
 import type { Change } from "../../model/staged";
 import { age, timeOfDay } from "../../ui/format";
@@ -11,6 +12,8 @@ import { ageMsOf, isStale, isUnsaved, rawOf } from "./cellValue";
 import { useBenchOfTable } from "./context";
 import { InlineEditor } from "./InlineEditor";
 import classes from "./Parameters.module.css";
+import { useMarks } from "./rules";
+import rules from "./Rules.module.css";
 import { plannedContext, useChange } from "./staging";
 
 const DASH = "–";
@@ -60,8 +63,35 @@ export function ValueCell(props: ValueCellProps) {
           <RamText {...props} entry={entry} cell={cell} side={side} />
         )}
       </span>
+      <RuleMark device={device} entry={entry} />
       {open && !change && <IconPencil size={15} className={classes.pencil} aria-hidden />}
     </button>
+  );
+}
+
+/** The value breaks a rule; of several the gravest gives the mark, all are named. */
+function RuleMark({ device, entry }: Pick<ValueCellProps, "device"> & { entry: EntryDoc }) {
+  const { t } = device;
+  const marks = useMarks(device.slug, entry.address);
+  const [gravest] = marks;
+  if (!gravest) return null;
+  const titles = marks.map((one) => `${t(`rule.${one.rule}.title`)}: ${lineOfFinding(one, t)}`).join("\n");
+  const Icon =
+    gravest.severity === "error"
+      ? IconCircleX
+      : gravest.severity === "warning"
+        ? IconAlertTriangle
+        : IconInfoCircle;
+  return (
+    <span
+      className={rules.mark}
+      data-severity={gravest.severity}
+      title={titles}
+      data-testid={`rule-mark-${entry.address}`}
+    >
+      <Icon size={15} aria-hidden />
+      <span className="visually-hidden">{titles}</span>
+    </span>
   );
 }
 
