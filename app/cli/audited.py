@@ -8,27 +8,33 @@ from contextlib import asynccontextmanager
 
 from app.cli.output import Output
 from app.errors import StoreInUseError
-from app.service.journal import Journal
+from app.service.connection import Connection
 
 
 @asynccontextmanager
-async def audited(arguments: argparse.Namespace, output: Output, journal: Journal) -> AsyncIterator[None]:
-    """Have what ``journal`` is told audited. Raises StoreError, before anything is done.
+async def audited(arguments: argparse.Namespace, output: Output, connection: Connection) -> AsyncIterator[None]:
+    """Have what the connection's journal is told audited, and its gate shut by restores that are not finished.
 
-    While a server has the store this is said instead: the server sees writes on the bus, and audits them as those of
-    another master.
+    While a server has the store it is only looked into, and this is said: the server sees writes on the bus, and audits
+    them as those of another master. Raises StoreError, before anything is done.
     """
     # Late: most commands on a bus change nothing, and need not wait for the store's libraries.
     from app.service.office.audit import AuditLog
+    from app.service.restore.blocking import block_of
+    from app.store.database import FILE
+    from app.store.restore_rows import open_restores, peek_open
     from app.store.store import Store
 
     try:
         store = Store.open(arguments.settings.data)
     except StoreInUseError:
+        connection.gate.blocks.put(block_of(row) for row in peek_open(arguments.settings.data / FILE))
         output.say("cli.no_audit")
         yield
         return
+    journal = connection.journal
     try:
+        connection.gate.blocks.put(block_of(row) for row in store.call(open_restores))
         audit = AuditLog(store)
         for entry in journal.latest():
             audit.take(entry)

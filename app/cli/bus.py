@@ -186,7 +186,7 @@ async def _write(arguments: argparse.Namespace, output: Output) -> int:
     async with connected(arguments, output) as connection:
         target = _target(connection, arguments.target)
         entry = target.entry(address)
-        async with audited(arguments, output, connection.journal):
+        async with audited(arguments, output, connection):
             try:
                 result = await write_text(
                     connection.driver(target),
@@ -226,7 +226,7 @@ def _tell_written(target: Target, entry: Entry, result: WriteResult, output: Out
 async def _save(arguments: argparse.Namespace, output: Output) -> int:
     async with connected(arguments, output) as connection:
         target = _target(connection, arguments.target)
-        async with audited(arguments, output, connection.journal):
+        async with audited(arguments, output, connection):
             await _save_one(connection, target, output)
     return 0
 
@@ -240,7 +240,7 @@ async def _save_one(connection: Connection, target: Target, output: Output) -> N
 async def _restart(arguments: argparse.Namespace, output: Output) -> int:
     async with connected(arguments, output) as connection:
         target = _target(connection, arguments.target)
-        async with audited(arguments, output, connection.journal):
+        async with audited(arguments, output, connection):
             took = await restart(connection.driver(target), target, connection.journal, connection.stamper)
         text = output.texts("cli.restart_done", device=target.slug, took_s=f"{took.took_s:.2f}")
         output.result({"device": target.slug, "took_s": took.took_s}, text)

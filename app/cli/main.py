@@ -25,6 +25,7 @@ COMMANDS: Final = {
     "od": ("od",),
     "twin": ("twin",),
     "bus": ("scan", "read", "write", "save", "restart", "backup", "record"),
+    "restore": ("restore",),
     "recordings": ("export", "recover"),
     "sets": ("sets",),
     "serve": ("serve",),

@@ -13,6 +13,8 @@ from app.errors import (
     HubsideError,
     NoAnswerError,
     RefusedError,
+    RestoreOpenError,
+    RestoreRefusedError,
     UnverifiedError,
     UsageError,
 )
@@ -98,6 +100,8 @@ def next_step(error: HubsideError) -> str | None:
     """Text key of what to do next."""
     for kind, key in (
         (UsageError, "usage"),
+        (RestoreOpenError, "restore_open"),
+        (RestoreRefusedError, "restore_refused"),
         (RefusedError, "refused"),
         (DeviceError, "device"),
         (NoAnswerError, "no_answer"),

@@ -23,13 +23,14 @@ from app.errors import (
 from app.model.set_record import SetRecord, Source
 from app.service.connection import Connection
 from app.service.devices import Target
-from app.service.gate import OPEN, Block, Blocks
+from app.service.gate import OPEN, Blocks
 from app.service.journal import Journal, Kind
 from app.service.office.office import Office
 from app.service.restore import details as detail
+from app.service.restore.blocking import block_of
 from app.service.restore.log import Kept, RestoreLog, load, new_row, value_rows
 from app.service.restore.motor_given import note_motors
-from app.service.restore.order import Cause, Order, Timing
+from app.service.restore.order import Broken, Cause, Order, Timing
 from app.service.restore.prepare import Prepared, prepare
 from app.service.restore.steps import Hands
 from app.service.restore.survey import Progress, Survey, targets_of
@@ -76,6 +77,7 @@ class Desk:
         self._monotonic = monotonic
         self._new_id = Uuid7(stamp)
         self._open: dict[str, RestoreRow] = {}
+        self._broken: dict[str, Broken] = {}
         for row in self._store.call(take_up):
             self._open[row.id] = row
         self._shut()
@@ -232,6 +234,8 @@ class Desk:
             self._open[row.id] = replace(row, state=RestoreState.INCOMPLETE)
         else:
             self._open.pop(row.id, None)
+        if transaction.broken is not None:
+            self._broken[row.id] = transaction.broken
         self._shut()
         self.running = None
         details = {"station": row.station, "restore": row.id}
@@ -244,6 +248,10 @@ class Desk:
         if end is End.NEW:
             with contextlib.suppress(StoreError, MotorUnknownError):
                 await note_motors(self._office.motors, json.loads(row.details)["devices"], person)
+
+    def why(self, restore_id: str) -> Broken | None:
+        """Why a restore that ran in this process did not go on."""
+        return self._broken.get(restore_id)
 
     async def wait(self, restore_id: str) -> End:
         """Until it is not worked on any more."""
@@ -293,9 +301,3 @@ def take_up(connection: Any) -> list[RestoreRow]:
             rows.put_state(connection, row.id, RestoreState.INCOMPLETE, json.dumps(outcome))
         found.append(replace(row, state=RestoreState.INCOMPLETE))
     return found
-
-
-def block_of(row: RestoreRow) -> Block:
-    """What an open restore blocks."""
-    devices = json.loads(row.details)["devices"]
-    return Block(row.id, row.station, frozenset((one["adapter"], one["node"]) for one in devices))

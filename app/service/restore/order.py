@@ -143,6 +143,11 @@ class Cause(Enum):
         return f"restore.cause.{self.value}"
 
     @property
+    def is_decision(self) -> bool:
+        """True where nothing went wrong: a person did not want the new values, or did not say so."""
+        return self in (Cause.NOT_CONFIRMED, Cause.CANCELLED)
+
+    @property
     def allows_rollback(self) -> bool:
         """True where the devices and the store can be reached, so that the old values can be put back at once."""
         return self not in (Cause.BUS_LOST, Cause.STORE_FAILED, Cause.TOOL_ENDED, Cause.DEFECT, Cause.OTHER_DEVICE)
