@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from app.errors import HubsideError, UsageError
+from app.errors import HubsideError, NoAnswerError, UsageError
 from app.model.address import Address
 from app.model.restore.wanted import DeviceState
 from app.model.sets import ParameterSet
@@ -70,8 +70,12 @@ async def survey(
 
 
 def _raise_where_dead(report: ReadReport) -> None:
+    """A device that falls silent half-way is not known: a plan would take what it did not tell for unreadable."""
     if report.lost is not None:
         raise report.lost
+    silent = (error for error in report.failed.values() if isinstance(error, NoAnswerError))
+    if (error := next(silent, None)) is not None:
+        raise error
     if not report.values and report.failed:
         raise next(iter(report.failed.values()))
 
