@@ -100,24 +100,20 @@ def to_set(
     )
 
 
-@dataclass(frozen=True, slots=True)
-class Kept:
-    """What became of one device: ``file`` None where nothing whole was read, and ``report`` says why."""
+def whole_sets(
+    reports: Iterable[ReadReport], turbine: str, person: str, reason: str, wall_ns: int, work_order: str = ""
+) -> list[ParameterSet]:
+    """The set of every device that was read; of one that was lost on the way there is none."""
+    return [
+        to_set(report, turbine, person, reason, wall_ns, work_order)
+        for report in reports
+        if report.values and report.lost is None
+    ]
 
-    report: ReadReport
-    file: Path | None
 
-
-def keep_sets(
-    reports: Iterable[ReadReport], folder: Path, turbine: str, person: str, reason: str, wall_ns: int
-) -> list[Kept]:
-    """Write a set file of every device that was read; of one that was lost on the way none is written."""
-    kept = []
-    for report in reports:
-        whole = bool(report.values) and report.lost is None
-        path = write_set(folder / turbine, to_set(report, turbine, person, reason, wall_ns)) if whole else None
-        kept.append(Kept(report, path))
-    return kept
+def write_sets(folder: Path, sets: Iterable[ParameterSet]) -> list[Path]:
+    """Write a file of every set into the folder of its turbine below ``folder``."""
+    return [write_set(folder / one.origin.turbine, one) for one in sets]
 
 
 def is_empty(error: HubsideError) -> bool:

@@ -125,6 +125,12 @@ STEPS: Final[tuple[tuple[str, ...], ...]] = (
             for doing in ("UPDATE", "DELETE")
         ),
     ),
+    (
+        """CREATE TABLE set_evidence (
+            record_id TEXT PRIMARY KEY NOT NULL REFERENCES set_records (id), recording TEXT NOT NULL,
+            seen TEXT NOT NULL
+        ) STRICT""",
+    ),
 )
 SCHEMA: Final = len(STEPS)
 """The version that this program writes."""

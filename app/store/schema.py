@@ -266,3 +266,12 @@ set_files = Table(
     Column("reason", Text),
 )
 """Set files of the data folder that were looked at: the record made of each, or the line and reason why none was."""
+
+set_evidence = Table(
+    "set_evidence",
+    metadata,
+    Column("record_id", Text, ForeignKey("set_records.id"), primary_key=True),
+    Column("recording", Text, nullable=False),
+    Column("seen", Text, nullable=False),
+)
+"""Of a set out of a recording, how each value was seen there. ``seen`` is JSON: address to time and direction."""

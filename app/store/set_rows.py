@@ -19,7 +19,7 @@ from app.model.address import parse_address
 from app.model.set_record import SetRecord, Source, Tag, TagEntry
 from app.model.sets import Identity, Origin, ParameterSet, iso_time, parse_content
 from app.store.fleet_rows import keep_latest
-from app.store.schema import nameplates, set_contents, set_records, set_tags
+from app.store.schema import nameplates, set_contents, set_evidence, set_records, set_tags
 from app.store.schema import set_files as files
 
 _SHORTEST_HASH = 8
@@ -127,6 +127,19 @@ def list_records(connection: Connection, wanted: Filter) -> list[SetRecord]:
     if wanted.tag is not None:
         query = query.where(set_records.c.id.in_(select(present_tags(wanted.tag).c.record_id)))
     return [_record(row) for row in connection.execute(query)]
+
+
+def put_evidence(connection: Connection, record_id: str, recording: str, seen: Mapping[str, object]) -> None:
+    """Keep how the values of a set were seen in a recording; what is kept already stays."""
+    if get_evidence(connection, record_id) is None:
+        row = {"record_id": record_id, "recording": recording, "seen": _json(seen)}
+        connection.execute(insert(set_evidence), row)
+
+
+def get_evidence(connection: Connection, record_id: str) -> tuple[str, dict[str, Any]] | None:
+    """The recording that a set comes from, and what was seen there by address; None where it comes from none."""
+    row = connection.execute(select(set_evidence).where(set_evidence.c.record_id == record_id)).first()
+    return None if row is None else (row.recording, json.loads(row.seen))
 
 
 # -- tags -------------------------------------------------------------------------------

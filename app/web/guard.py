@@ -53,6 +53,9 @@ SIGNED_OUT: Final = 4401
 """Code with which a socket is closed whose session has ended (4000 to 4999 are for applications, RFC 6455, 7.4.2)."""
 MAX_BODY: Final = 65_536
 """Of a request, in bytes: the longest list of addresses and the longest value fit."""
+MAX_FILE: Final = 12 * 1024 * 1024
+"""Of a request that brings a file, in bytes."""
+_BRINGS_FILE: Final = ("/api/sets/import",)
 _WITH_BODY: Final = ("POST", "PUT", "PATCH")
 _FOREIGN: Final = ("cross-site", "same-site")
 _COMMON: Final = "default-src 'self'; base-uri 'none'; form-action 'none'; object-src 'none'"
@@ -128,8 +131,9 @@ class Guard:
         if method in _WITH_BODY and _media_type(headers) != "application/json":
             return InvalidRequestError(reason=f"Content-Type '{_media_type(headers)}' is not application/json")
         length = headers.get("content-length", "")
-        if length.isdecimal() and int(length) > MAX_BODY:
-            return _too_large()
+        most = largest_body(str(scope["path"]))
+        if length.isdecimal() and int(length) > most:
+            return _too_large(most)
         return None
 
     async def _launched(self, scope: Scope) -> str | None:
@@ -166,9 +170,10 @@ class Guard:
         if scope.get("method") not in _WITH_BODY:
             await self._app(scope, receive, secured)
             return
-        body = await _body(receive)
+        most = largest_body(str(scope["path"]))
+        body = await _body(receive, most)
         if body is None:
-            await _refuse(scope, headers, send, _too_large())
+            await _refuse(scope, headers, send, _too_large(most))
         else:
             await self._app(scope, _given(body, receive), secured)
 
@@ -229,7 +234,12 @@ def _is_open(scope: Scope) -> bool:
     return served and method in ("GET", "HEAD")
 
 
-async def _body(receive: Receive) -> list[Message] | None:
+def largest_body(path: str) -> int:
+    """How many bytes a request to ``path`` may bring."""
+    return MAX_FILE if path in _BRINGS_FILE else MAX_BODY
+
+
+async def _body(receive: Receive, most: int) -> list[Message] | None:
     """A request's messages up to the end of its body, or until it is gone; None where the body is too large."""
     messages: list[Message] = []
     size = 0
@@ -237,7 +247,7 @@ async def _body(receive: Receive) -> list[Message] | None:
         message = await receive()
         messages.append(message)
         size += len(message.get("body", b""))
-        if size > MAX_BODY:
+        if size > most:
             return None
         if not message.get("more_body", False):
             return messages
@@ -253,8 +263,8 @@ def _given(messages: list[Message], receive: Receive) -> Receive:
     return next_one
 
 
-def _too_large() -> TooLargeError:
-    return TooLargeError(reason=f"the body is larger than {MAX_BODY} bytes")
+def _too_large(most: int) -> TooLargeError:
+    return TooLargeError(reason=f"the body is larger than {most} bytes")
 
 
 def security_headers(path: str, host: str, secure: bool = False) -> Headers:

@@ -8,14 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from app.errors import SetFileError
-from app.model.address import Address
-from app.model.sets import Identity, Origin, ParameterSet
 from app.recording.content import EventKind
-from app.service.backup import write_set
 from app.service.file_list import FileList
 from app.service.recording_list import FileState, Recordings, attachment, details
-from app.service.set_list import SetFiles, open_set
 
 SAMPLE = Path(__file__).resolve().parents[2] / "recordings" / "oat-six-nodes.mcap"
 
@@ -110,25 +105,3 @@ def test_no_folder_is_an_empty_list(tmp_path: Path) -> None:
     recordings = Recordings(tmp_path / "nothing")
     assert recordings.files(None) == []
     assert recordings.free_bytes is None
-
-
-def make_set(**values: int) -> ParameterSet:
-    origin = Origin("wtg-07", "wtg-07/blade-1/pmc", 11, "2026-11-22T05:00:00Z", "tester", "why", "hubside")
-    addresses = {Address(int(key[1:], 16)): raw for key, raw in values.items()}
-    return ParameterSet("oat-pmc", "1.0.0", Identity(serial=7), origin, addresses, {Address(0x6067): "timeout"})
-
-
-def test_sets_are_listed_with_their_heads_and_wrong_ones_with_the_reason(tmp_path: Path) -> None:
-    good = write_set(tmp_path / "wtg-07", make_set(x6065=100, x6066=10))
-    changed = tmp_path / "wtg-07" / "changed.json"
-    changed.write_text(good.read_text().replace("100", "101"))
-    files = {one.name: one.look for one in SetFiles(tmp_path).files()}
-    assert set(files) == {f"wtg-07/{good.name}", "wtg-07/changed.json"}
-    look = files[f"wtg-07/{good.name}"]
-    assert look is not None and look.origin is not None and look.identity is not None
-    assert (look.values, look.unread, look.identity.serial, look.origin.reason) == (2, 1, 7, "why")
-    wrong = files["wtg-07/changed.json"]
-    assert wrong is not None and wrong.origin is None
-    assert wrong.reason is not None and "hash" in wrong.reason
-    with pytest.raises(SetFileError):
-        open_set(changed)

@@ -73,10 +73,17 @@ ROUTES: Final[dict[tuple[str, str], Role]] = {
     ("GET", "/api/recordings/{name}/download"): VIEWER,
     ("GET", "/api/recordings/{name}/attachment"): VIEWER,
     ("GET", "/api/sets"): VIEWER,
-    ("GET", "/api/sets/{turbine}/{file}"): VIEWER,
-    ("GET", "/api/sets/{turbine}/{file}/download"): VIEWER,
+    ("GET", "/api/sets/{key}"): VIEWER,
+    ("GET", "/api/sets/{key}/download"): VIEWER,
+    ("POST", "/api/sets/{key}/tags"): TECHNICIAN,
+    ("POST", "/api/sets/import"): TECHNICIAN,
+    ("POST", "/api/recordings/{name}/recover-sets"): TECHNICIAN,
+    ("GET", "/api/nameplates"): VIEWER,
+    ("PUT", "/api/nameplates"): TECHNICIAN,
+    ("GET", "/api/descriptions/{description_id}"): VIEWER,
     ("POST", "/api/live/backup"): TECHNICIAN,
     ("POST", "/api/compare"): VIEWER,
+    ("POST", "/api/compare/export"): VIEWER,
     ("GET", "/api/parity"): VIEWER,
     ("POST", "/api/fleet"): VIEWER,
     ("GET", "/api/rules"): VIEWER,
@@ -156,7 +163,7 @@ PLACES: Final = {
     "{fault}": "1",
     "{restore_id}": "0197a000-0000-7000-8000-000000000000",
     "{name}": "none.mcap",
-    "{file}": "none.json",
+    "{key}": "none",
 }
 
 PEOPLE: Final = {

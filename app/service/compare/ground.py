@@ -57,16 +57,16 @@ class Ground:
         return tuple(dict.fromkeys(one for one in known if one != slug and station_slug(one) == station))
 
     def description(self, description_id: str) -> Description | None:
-        """What describes that kind of device: what the connected ones have, the sites', else one of ours."""
-        return next((one for one in self._descriptions(description_id) if one.id == description_id), None)
+        """What describes that kind of device."""
+        return next((one for one in self.descriptions() if one.id == description_id), None)
 
-    def _descriptions(self, description_id: str) -> Iterator[Description]:
+    def descriptions(self) -> Iterator[Description]:
+        """All that are known: those of the connected devices, then the sites', then ours."""
         yield from (target.description for target in self.targets)
         yield from self.known
         for turbine in () if self.sites is None else self.sites.turbines.values():
             yield from _described(self.sites, turbine.slug)
-        if description_id in BUILTIN:
-            yield load_builtin(description_id)
+        yield from (load_builtin(name) for name in BUILTIN)
 
 
 def _described(sites: Sites | None, turbine: str) -> Iterable[Description]:

@@ -12,14 +12,15 @@ from app.errors import SetUnknownError
 from app.model.address import Address, parse_address
 from app.model.datatypes import Raw
 from app.model.diff.column import Column
+from app.model.set_head import Taking
+from app.model.set_import import read_set_file
 from app.model.set_record import SetRecord, Tag
-from app.model.sets import ParameterSet
+from app.model.sets import Origin, ParameterSet, iso_time
 from app.service.compare.ground import Ground
 from app.service.compare.known import Known, defaults_of, ram_of, stored_of
 from app.service.compare.spec import ColumnKind, ColumnSpec, Unresolved, parse_spec
 from app.service.devices import Target
 from app.service.library.library import Library
-from app.service.set_list import open_set
 from app.service.views import RawJson, raw_from_json
 from app.store.set_rows import Filter
 from app.store.visit_rows import Phase
@@ -154,9 +155,16 @@ class Columns:
         return Shown(spec, column, origin.t_ns, origin.person, origin.reason, parameters.hash, record, twin)
 
     def _file(self, spec: ColumnSpec) -> Shown:
+        """A file of this computer. Raises ColumnError, SetFileError, OSError."""
         if not self.ground.files:
             raise Unresolved.NOT_HERE.error(str(spec))
-        return self.of_set(spec, open_set(Path(spec.of)))
+        path = Path(spec.of)
+        # What says nothing of itself, as a DCF of another tool, is named by its file and is of the file's time.
+        taken = iso_time(path.stat().st_mtime_ns)
+        origin = Origin(turbine="", device=path.name, node=0, time=taken, person="", reason="", tool="")
+        known = {one.id: one for one in reversed(list(self.ground.descriptions()))}
+        taking = Taking(known, origin)
+        return self.of_set(spec, read_set_file(path.read_bytes(), path.name, taking).parameters)
 
     def _library(self, spec: ColumnSpec) -> Library:
         if self.ground.library is None:

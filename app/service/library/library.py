@@ -5,11 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable
 from dataclasses import replace
-from typing import Final
+from typing import Any, Final
 
 from app.errors import NameplateError, SetTagError, SetUnknownError, StoreDamagedError
+from app.model.set_head import Imported
 from app.model.set_record import SetRecord, Source, Tag, TagEntry
 from app.model.sets import ParameterSet
+from app.service.library.recovered import Recovered
 from app.service.office.audit import Action, AuditLog
 from app.store import set_rows
 from app.store.set_rows import Filter, Nameplate
@@ -68,6 +70,32 @@ class Library:
         """Records, latest first."""
         asked = wanted or Filter()
         return await self._store.run(lambda kept: set_rows.list_records(kept, asked))
+
+    async def put_recovered(self, recovered: Recovered, recording: str, person: str) -> list[SetRecord]:
+        """Keep the sets of a recording, each with how its values were seen."""
+
+        def work(kept: Connection) -> list[SetRecord]:
+            records = []
+            for one in recovered.sets:
+                record = self.put_in(kept, one.parameters, Source.RECORDING)
+                seen = {str(address): look.as_json() for address, look in one.seen.items()}
+                set_rows.put_evidence(kept, record.id, recording, seen)
+                records.append(record)
+            return records
+
+        records = await self._store.run(work)
+        self._audit.note(Action.SETS_RECOVERED, person, None, recording=recording, sets=len(records))
+        return records
+
+    async def evidence(self, record: SetRecord) -> tuple[str, dict[str, Any]] | None:
+        """The recording that a set comes from, and by address how its values were seen; None for other sets."""
+        return await self._store.run(lambda kept: set_rows.get_evidence(kept, record.id))
+
+    async def take(self, imported: Imported, file: str, person: str) -> SetRecord:
+        """Keep a set that was read from a file."""
+        (record,) = await self.put([imported.parameters], Source.FILE)
+        self._audit.note(Action.SET_IMPORTED, person, record.origin.device, file=file, set=record.id, hash=record.hash)
+        return record
 
     # -- tags -------------------------------------------------------------------------
 

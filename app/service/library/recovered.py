@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from app import __version__
 from app.errors import RecordingError
@@ -48,6 +48,11 @@ class Seen:
     access: SdoAccess
     ours: bool
     doubt: Doubt | None = None
+
+    def as_json(self) -> dict[str, Any]:
+        """For the store."""
+        doubt = None if self.doubt is None else self.doubt.value
+        return {"t_ns": self.t_ns, "access": self.access.value, "ours": self.ours, "doubt": doubt}
 
 
 @dataclass(frozen=True, slots=True)

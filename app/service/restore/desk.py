@@ -28,7 +28,7 @@ from app.service.journal import Journal, Kind
 from app.service.office.office import Office
 from app.service.restore import details as detail
 from app.service.restore.blocking import block_of
-from app.service.restore.log import Kept, RestoreLog, load, new_row, value_rows
+from app.service.restore.log import Kept, RestoreLog, event, load, new_row, value_rows
 from app.service.restore.motor_given import note_motors
 from app.service.restore.order import Broken, Cause, Order, Timing
 from app.service.restore.prepare import Prepared, prepare
@@ -78,7 +78,7 @@ class Desk:
         self._new_id = Uuid7(stamp)
         self._open: dict[str, RestoreRow] = {}
         self._broken: dict[str, Broken] = {}
-        for row in self._store.call(take_up):
+        for row in self._store.call(lambda connection: take_up(connection, stamp())):
             self._open[row.id] = row
         self._shut()
 
@@ -208,6 +208,7 @@ class Desk:
             saves=frozenset(details["saves"]),
             restart=details["restart"],
             expert=details["expert"],
+            station=kept.row.station,
             person=person,
             reason=REASON_AFTER,
             serials={one["slug"]: one["identity"].get("serial") for one in details["devices"]},
@@ -292,12 +293,20 @@ _KIND_OF: Final[Mapping[End, Kind]] = {
 }
 
 
-def take_up(connection: Any) -> list[RestoreRow]:
+def take_up(connection: Any, now_ns: int) -> list[RestoreRow]:
     """What an earlier run left open is incomplete from now on: its tool ended, and its deadline with it."""
     found = []
     for row in rows.open_restores(connection):
         if row.state is not RestoreState.INCOMPLETE:
-            outcome = {**json.loads(row.outcome), "cause": Cause.TOOL_ENDED.value, "in_state": row.state.value}
-            rows.put_state(connection, row.id, RestoreState.INCOMPLETE, json.dumps(outcome))
-        found.append(replace(row, state=RestoreState.INCOMPLETE))
+            row = replace(row, state=RestoreState.INCOMPLETE, outcome=_ended_with_its_tool(row, now_ns))
+            rows.put_state(connection, row.id, row.state, row.outcome)
+        found.append(row)
     return found
+
+
+def _ended_with_its_tool(row: RestoreRow, now_ns: int) -> str:
+    outcome = json.loads(row.outcome)
+    cause = Cause.TOOL_ENDED
+    told = event(now_ns, f"journal.{Kind.RESTORE_INCOMPLETE.value}", station=row.station, cause_key=cause.text_key)
+    outcome |= {"cause": cause.value, "in_state": row.state.value, "events": [*outcome.get("events", ()), told]}
+    return json.dumps(outcome, ensure_ascii=False)

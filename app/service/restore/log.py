@@ -5,17 +5,21 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Final
 
 from app.errors import HubsideError, StoreError
 from app.model.address import parse_address
 from app.model.datatypes import Raw
 from app.model.restore.plan import StepKind
 from app.model.station import Place
+from app.service.journal import Kind
 from app.service.restore.order import Broken, Cause
 from app.store import restore_rows as rows
 from app.store.restore_rows import Direction, RestoreRow, RestoreState, StepRow, StepState, ValueRow
 from app.store.store import Store
+
+
+BEGUN: Final = f"journal.{Kind.RESTORE_BEGUN.value}"
 
 
 def raw_text(raw: Raw) -> str:
@@ -97,6 +101,11 @@ class RestoreLog:
         self.outcome = kept.outcome
         self.saves_begun = set(kept.saves_begun)
 
+    def tell(self, text_key: str, person: str = "", **details: str) -> None:
+        """Something that happened to the restore as a whole; kept with the next state."""
+        events = [*self.outcome.get("events", ()), event(self._stamp(), text_key, person, **details)]
+        self.outcome = {**self.outcome, "events": events}
+
     async def enter(self, state: RestoreState, **outcome: Any) -> None:
         """The restore is in ``state`` from now on. ``outcome`` adds to what is known of it; None takes away."""
         merged = {**self.outcome, **outcome}
@@ -144,6 +153,11 @@ class RestoreLog:
             raise Broken(Cause.STORE_FAILED, "", error) from error
 
 
+def event(t_ns: int, text_key: str, person: str = "", **details: str) -> dict[str, Any]:
+    """One event of a restore, as it is kept."""
+    return {"t_ns": t_ns, "text_key": text_key, "person": person, "details": details}
+
+
 def new_row(restore_id: str, turbine: str, order: Any, details: Mapping[str, Any], now_ns: int) -> RestoreRow:
     """The row of a restore that begins."""
     return RestoreRow(
@@ -156,6 +170,7 @@ def new_row(restore_id: str, turbine: str, order: Any, details: Mapping[str, Any
         order.work_order,
         now_ns,
         json.dumps(details, ensure_ascii=False),
+        outcome=json.dumps({"events": [event(now_ns, BEGUN, order.person, station=order.station)]}, ensure_ascii=False),
     )
 
 

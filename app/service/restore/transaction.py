@@ -19,6 +19,7 @@ from app.model.restore.plan import Plan, Step, StepKind
 from app.model.restore.planner import make_plan
 from app.model.restore.wanted import PlanOptions, Wanted
 from app.model.station import Place
+from app.service.journal import Kind
 from app.service.restore.log import RestoreLog, error_document
 from app.service.restore.order import Broken, Cause
 from app.service.restore.steps import LOOK_S, Hands, cause_of
@@ -48,6 +49,7 @@ class Terms:
     saves: frozenset[str]
     restart: bool
     expert: bool
+    station: str
     person: str
     reason: str
     serials: Mapping[str, int | None] = field(default_factory=dict)
@@ -113,10 +115,12 @@ class Transaction:
 
     async def resume(self) -> End:
         """On to the new values from whatever is there. What fails leaves it incomplete: a person decides again."""
+        self._tell(Kind.RESTORE_RESUMED)
         return await self._guarded(self._go_on(), falls_back=False)
 
     async def back(self, cause: Cause | None = None) -> End:
         """To the old values from whatever is there."""
+        self._tell(Kind.RESTORE_TURNED_BACK)
         return await self._guarded(self._go_back(cause), falls_back=False)
 
     async def _guarded(self, way: object, falls_back: bool) -> End:
@@ -141,6 +145,7 @@ class Transaction:
         outcome = _outcome_of(broken)
         if self.broken is not broken:
             outcome["first_cause"] = self.broken.cause.value
+        self._tell(Kind.RESTORE_INCOMPLETE, "", cause_key=broken.cause.text_key)
         try:
             await self._log.enter(RestoreState.INCOMPLETE, **outcome)
         except Broken:
@@ -156,6 +161,8 @@ class Transaction:
 
     async def _go_back(self, cause: Cause | None) -> End:
         known = {} if self.broken is None else _outcome_of(self.broken)
+        if self._back_by is not None:
+            self._tell(Kind.RESTORE_TURNED_BACK, self._back_by)
         await self._log.enter(RestoreState.ROLLING_BACK, **known)
         options = self._options(frozenset(self._log.saves_begun))
         plan = await self._plan(Direction.BACK, options)
@@ -211,6 +218,11 @@ class Transaction:
         restarted = {step.device for step in steps if step.kind is StepKind.RESTART}
         proven = bool(saved) and saved <= restarted
         back = direction is Direction.BACK
+        cause = Cause.CANCELLED if self.broken is None else self.broken.cause
+        if back:
+            self._tell(Kind.RESTORE_ROLLED_BACK, "", cause_key=cause.text_key)
+        else:
+            self._tell(Kind.RESTORE_DONE)
         await self._log.enter(RestoreState.ROLLED_BACK if back else RestoreState.DONE, proven=proven)
         return End.OLD if back else End.NEW
 
@@ -247,6 +259,7 @@ class Transaction:
                 self._hands.look_for_restarts()
                 await asyncio.sleep(LOOK_S)
             self._look_for_people(direction)
+        self._tell(Kind.RESTORE_CONFIRMED, self._confirmed_by)
         await self._log.enter(
             RestoreState.SAVING, confirmed_by=self._confirmed_by, confirmed_ns=self._hands.connection.stamper()
         )
@@ -260,6 +273,11 @@ class Transaction:
         for slug in dict.fromkeys(place.slug for place in goals):
             await self._hands.prove(slug, goals, found, direction)
         self.found = found
+
+    def _tell(self, kind: Kind, person: str | None = None, **details: str) -> None:
+        """For the record: what happened to the restore as a whole."""
+        who = self._terms.person if person is None else person
+        self._log.tell(f"journal.{kind.value}", who, station=self._terms.station, **details)
 
     async def _read(self) -> Survey:
         terms = self._terms
