@@ -7,6 +7,7 @@ import { DeafBanner } from "./DeafBanner";
 import { EventDrawer } from "./EventDrawer";
 import classes from "./Frame.module.css";
 import { Navigation } from "./Navigation";
+import { RestoreBanner } from "./RestoreBanner";
 import { SceneDock } from "./SceneDock";
 import { TopBar } from "./TopBar";
 import { useEscapeStops } from "./stop";
@@ -23,8 +24,11 @@ export function Frame() {
   return (
     <div className={classes.frame} data-deaf={deaf} data-mode={mode} data-page={path}>
       <TopBar />
-      <DeafBanner />
-      <ConsentBanner />
+      <div className={classes.banners}>
+        <DeafBanner />
+        <ConsentBanner />
+        <RestoreBanner />
+      </div>
       <Navigation />
       <main className={classes.main}>
         <Suspense>

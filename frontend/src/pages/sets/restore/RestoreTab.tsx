@@ -1,14 +1,25 @@
+import { useQuery } from "@tanstack/react-query";
+import { turbineQuery } from "../../../api/queries";
+import { usePageSearch } from "../../../frame/search";
 import { useTexts } from "../../../texts/texts";
-import room from "../../../ui/Room.module.css";
+import { History } from "./History";
+import { setsIn } from "./order";
+import { PlanView } from "./PlanView";
+import classes from "./Restore.module.css";
+import { RestoreRun } from "./RestoreRun";
+import { Setup } from "./Setup";
 
+/** Sets put back into a station: chosen, planned, looked at, run, confirmed, proven; and all that were. */
 export function RestoreTab() {
   const t = useTexts();
+  const [search] = usePageSearch();
+  const connected = useQuery(turbineQuery).data !== undefined;
+  if (search.restore !== undefined) return <RestoreRun key={search.restore} id={search.restore} />;
+  const chosen = search.station !== undefined && setsIn(search.sets).length > 0;
   return (
-    <div className={room.room}>
-      <div className={room.strip}>
-        <h1>{t("page.sets.tab.restore")}</h1>
-      </div>
-      <p className={room.note}>{t("page.sets.empty.restore")}</p>
+    <div className={classes.room}>
+      {connected ? <Setup /> : <p className={classes.note}>{t("page.restoring.connect_first")}</p>}
+      {connected && chosen ? <PlanView /> : <History />}
     </div>
   );
 }

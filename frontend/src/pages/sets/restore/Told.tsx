@@ -1,0 +1,264 @@
+import { Checkbox } from "@mantine/core";
+import {
+  IconAlertTriangle,
+  IconCircleCheck,
+  IconListCheck,
+  IconRefresh,
+  IconShieldX,
+  IconTool,
+} from "@tabler/icons-react";
+import type { PlanDoc, PlanFinding, PlanSource, Refusal } from "../../../api/restore";
+import { useRole } from "../../../frame/role";
+import { type Translate, useTexts } from "../../../texts/texts";
+import { useDeviceName } from "../../../ui/devices";
+import { dateAndTime } from "../../../ui/format";
+import type { Terms } from "./order";
+import classes from "./Restore.module.css";
+
+interface Props {
+  plan: PlanDoc;
+  station: string;
+  confirmMin: number;
+  terms: Terms;
+  onTerms: (terms: Terms) => void;
+}
+
+/** What the restore will do to which blade, what speaks against it, what the rules say, and what it needs. */
+export function Told(props: Props) {
+  const t = useTexts();
+  return (
+    <div
+      className={classes.told}
+      tabIndex={0}
+      role="region"
+      aria-label={t("page.restoring.told")}
+      data-testid="restore-told"
+    >
+      <Refusals {...props} />
+      <WhatHappens {...props} />
+      <Needs plan={props.plan} />
+      <Findings {...props} />
+    </div>
+  );
+}
+
+const OTHER_BLADES = "other-blades";
+
+function Refusals({ plan, terms, onTerms }: Props) {
+  const t = useTexts();
+  const { may } = useRole();
+  if (plan.refusals.length === 0)
+    return (
+      <section>
+        <h2 className="tone-ok" data-testid="precheck-passed">
+          <IconCircleCheck size={20} aria-hidden />
+          {t("page.restoring.precheck.passed")}
+        </h2>
+      </section>
+    );
+  const others = terms.othersConfirmed || plan.refusals.some((one) => one.code === OTHER_BLADES);
+  return (
+    <section>
+      <h2 className="tone-error" role="status" data-testid="precheck-refused">
+        <IconShieldX size={20} aria-hidden />
+        {t("page.restoring.precheck.refused", { count: plan.refusals.length })}
+      </h2>
+      <ul>
+        {plan.refusals.map((one) => (
+          <RefusalLine key={`${one.code} ${one.device}`} refusal={one} />
+        ))}
+      </ul>
+      {others && may("expert") && (
+        <Checkbox
+          mt="sm"
+          label={t("page.restoring.others_confirmed")}
+          checked={terms.othersConfirmed}
+          onChange={(event) => onTerms({ ...terms, othersConfirmed: event.currentTarget.checked })}
+          data-testid="others-confirmed"
+        />
+      )}
+    </section>
+  );
+}
+
+function RefusalLine({ refusal }: { refusal: Refusal }) {
+  const t = useTexts();
+  const nameOf = useDeviceName();
+  return (
+    <li data-testid={`refusal-${refusal.code}`}>
+      {refusal.device !== "" && <strong>{nameOf(refusal.device)}: </strong>}
+      {t(refusal.text_key, refusal.details)}
+    </li>
+  );
+}
+
+/** In plain words and in the order in which it happens. */
+function WhatHappens({ plan, station, confirmMin, terms }: Props) {
+  const t = useTexts();
+  const nameOf = useDeviceName();
+  const writes = countBy(plan.steps.filter((step) => step.kind === "write").map((step) => step.device));
+  const saved = plan.steps.filter((step) => step.kind === "save").map((step) => nameOf(step.device));
+  const homed = Object.keys(plan.needs);
+  if (writes.size === 0) return null;
+  const devices = saved.join(t("page.restoring.and"));
+  return (
+    <section data-testid="what-happens">
+      <h2>
+        <IconListCheck size={20} aria-hidden />
+        {t("page.restoring.happens.title", { station })}
+      </h2>
+      <ol>
+        {[...writes].map(([slug, count]) => (
+          <li key={slug}>
+            {t(`page.restoring.happens.write${count === 1 ? "_one" : ""}`, { count, device: nameOf(slug) })}
+            {homed.includes(slug) && <small>{t("page.restoring.happens.homing")}</small>}
+          </li>
+        ))}
+        <li>{t("page.restoring.happens.confirm", { minutes: confirmMin })}</li>
+        <li>
+          {t("page.restoring.happens.save", { devices })}
+          <small>{t("page.restoring.happens.save_all")}</small>
+        </li>
+        {terms.restart && <li>{t("page.restoring.happens.restart", { devices })}</li>}
+        <li>{t(`page.restoring.happens.${terms.restart ? "prove" : "prove_ram"}`)}</li>
+      </ol>
+      <p className="dim">{t("page.restoring.happens.meanwhile", { station })}</p>
+      <Sources sources={plan.sources} t={t} nameOf={nameOf} />
+    </section>
+  );
+}
+
+function Sources({
+  sources,
+  t,
+  nameOf,
+}: {
+  sources: readonly PlanSource[];
+  t: Translate;
+  nameOf: (slug: string) => string;
+}) {
+  return (
+    <ul className={classes.sources}>
+      {sources.map((one) => (
+        <li key={one.device}>
+          {t("page.restoring.source", {
+            device: nameOf(one.device),
+            from: one.from_device,
+            time: dateAndTime(Date.parse(one.time)),
+            person: one.person,
+          })}
+          <small>{t(`page.restoring.unit.${one.same_unit ? "same" : "other"}`)}</small>
+        </li>
+      ))}
+    </ul>
+  );
+}
+
+function Needs({ plan }: { plan: PlanDoc }) {
+  const t = useTexts();
+  const nameOf = useDeviceName();
+  const needs = Object.entries(plan.needs);
+  if (needs.length === 0 && plan.restarts.length === 0) return null;
+  return (
+    <section data-testid="restore-needs">
+      {needs.length > 0 && (
+        <>
+          <h2>
+            <IconTool size={20} aria-hidden />
+            {t("page.restoring.needs")}
+          </h2>
+          <ul>
+            {needs.map(([slug, list]) => (
+              <li key={slug}>
+                {nameOf(slug)}: {list.map((need) => t(`restore.need.${need}`)).join(", ")}
+              </li>
+            ))}
+          </ul>
+        </>
+      )}
+      {plan.restarts.map((slug) => (
+        <p key={slug}>
+          <IconRefresh size={16} aria-hidden /> {t("page.restoring.needs_restart", { device: nameOf(slug) })}
+        </p>
+      ))}
+    </section>
+  );
+}
+
+/** What the rules say of the station as it will be: broken ones first, then those that could not be judged. */
+function Findings({ plan, terms, onTerms }: Props) {
+  const t = useTexts();
+  const broken = plan.findings.filter((one) => one.verdict === "broken");
+  const unjudged = plan.findings.filter((one) => one.verdict === "not-checked");
+  return (
+    <section data-testid="restore-findings">
+      <h2 className={broken.length > 0 ? "tone-warning" : ""}>
+        {broken.length > 0 ? (
+          <IconAlertTriangle size={20} aria-hidden />
+        ) : (
+          <IconCircleCheck size={20} aria-hidden />
+        )}
+        {t(`page.restoring.rules.${broken.length > 0 ? "broken" : "kept"}`, { count: broken.length })}
+      </h2>
+      <ul>
+        {broken.map((one, at) => (
+          <FindingLine key={`${one.rule} ${at}`} finding={one} plan={plan} terms={terms} onTerms={onTerms} />
+        ))}
+      </ul>
+      {unjudged.length > 0 && (
+        <details>
+          <summary>{t("page.restoring.rules.not_checked", { count: unjudged.length })}</summary>
+          <ul>
+            {unjudged.map((one) => (
+              <li key={one.rule}>
+                {t(`rule.${one.rule}.title`)}
+                <small>{t("rule.not_checked", one.details)}</small>
+              </li>
+            ))}
+          </ul>
+        </details>
+      )}
+    </section>
+  );
+}
+
+interface FindingProps {
+  finding: PlanFinding;
+  plan: PlanDoc;
+  terms: Terms;
+  onTerms: (terms: Terms) => void;
+}
+
+/** An expert may accept an error that stands in the station already; a new one the server lets nobody accept. */
+function FindingLine({ finding, plan, terms, onTerms }: FindingProps) {
+  const t = useTexts();
+  const { may } = useRole();
+  const { rule, severity } = finding;
+  const accepted = terms.accepted.includes(rule);
+  const blocks = plan.blockers.some((one) => one.rule === rule);
+  const others = terms.accepted.filter((one) => one !== rule);
+  return (
+    <li data-testid={`finding-${rule}`}>
+      <span className={severity === "error" ? "tone-error" : severity === "warning" ? "tone-warning" : "dim"}>
+        {t(`page.restoring.severity.${severity}`)}
+      </span>{" "}
+      {t(`rule.${rule}.broken`, finding.details)}
+      <small>{t(`rule.${rule}.why`)}</small>
+      {blocks && accepted && <small className="tone-error">{t("page.restoring.rules.new")}</small>}
+      {may("expert") && (blocks || accepted) && (
+        <Checkbox
+          label={t("page.restoring.rules.accept")}
+          checked={accepted}
+          onChange={() => onTerms({ ...terms, accepted: accepted ? others : [...others, rule] })}
+          data-testid={`accept-${rule}`}
+        />
+      )}
+    </li>
+  );
+}
+
+function countBy(slugs: readonly string[]): Map<string, number> {
+  const counts = new Map<string, number>();
+  for (const slug of slugs) counts.set(slug, (counts.get(slug) ?? 0) + 1);
+  return counts;
+}

@@ -1,0 +1,73 @@
+/** What a restore is asked for with, as the URL has it, and the plan that comes of it. */
+import { keepPreviousData, useQuery } from "@tanstack/react-query";
+import { useMemo } from "react";
+import { planQuery, type PlanDoc, type PlanRequest } from "../../../api/restore";
+import { turbineQuery } from "../../../api/queries";
+import type { StationRef } from "../../../api/types";
+import { usePageSearch } from "../../../frame/search";
+import { placesOf, useDeviceName } from "../../../ui/devices";
+import { useTexts } from "../../../texts/texts";
+import { useContexts } from "../../parameters/devicesOf";
+import { linesOf, type PlanLine, selectedIn } from "./plan";
+
+/** What a person ticks besides the objects. */
+export interface Terms {
+  restart: boolean;
+  othersConfirmed: boolean;
+  accepted: readonly string[];
+}
+
+export const NO_TERMS: Terms = { restart: true, othersConfirmed: false, accepted: [] };
+
+export const setsIn = (text: string | undefined): string[] => (text ?? "").split(",").filter(Boolean);
+
+export function useOrder(terms: Terms): { station: StationRef | undefined; order: PlanRequest | null } {
+  const [search] = usePageSearch();
+  const turbine = useQuery(turbineQuery).data;
+  const station = turbine?.stations.find((one) => one.slug === search.station);
+  const order = useMemo(() => {
+    const sets = setsIn(search.sets);
+    if (!station || sets.length === 0) return null;
+    const devices = station.devices.map((one) => one.slug);
+    return {
+      station: station.slug,
+      sets,
+      selected: selectedIn(search.select, devices),
+      restart: terms.restart,
+      other_blades_confirmed: terms.othersConfirmed,
+      accepted: [...terms.accepted],
+    };
+  }, [station, search.sets, search.select, terms]);
+  return { station, order };
+}
+
+export interface Planned {
+  plan: PlanDoc | undefined;
+  lines: PlanLine[];
+  /** The plan on show is of another order than the one that is asked for now. */
+  outdated: boolean;
+  reading: boolean;
+  error: unknown;
+  readAgain: () => void;
+}
+
+export function usePlan(order: PlanRequest | null): Planned {
+  const t = useTexts();
+  const nameOf = useDeviceName();
+  const places = placesOf(useQuery(turbineQuery).data ?? undefined);
+  const contexts = useContexts(places);
+  const query = useQuery({ ...planQuery(order), placeholderData: keepPreviousData });
+  const plan = query.data;
+  const lines = useMemo(
+    () => (plan ? linesOf(plan, { t, contexts, nameOf }) : []),
+    [plan, t, contexts, nameOf],
+  );
+  return {
+    plan,
+    lines,
+    outdated: query.isPlaceholderData || query.isFetching,
+    reading: query.isFetching,
+    error: query.error,
+    readAgain: () => void query.refetch(),
+  };
+}
