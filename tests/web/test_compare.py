@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import csv
+import io
+import re
 from collections.abc import AsyncIterator
 from typing import Any
 
@@ -86,3 +89,40 @@ async def test_a_rule_that_a_column_breaks_is_told_at_its_row(server: Server) ->
     assert told["findings"], "no rule notices"
     assert all(numbers == [1] for numbers in told["found_in"].values())
     assert list(told["found_in"]) == told["findings"]
+
+
+async def exported(server: Server, file_format: str, language: str = "en", same: bool = False) -> str:
+    body = {"columns": [f"live:{PMM}", f"editor:{PMM}"], "pending": {PMM: {"3110:01": 490, "3300:01": 5}}}
+    address = f"/api/compare/export?format={file_format}&same={same}"
+    answer = await server.client.post(address, json=body, headers={"Accept-Language": language})
+    assert answer.status_code == 200
+    assert f'filename="comparison.{file_format}"' in answer.headers["content-disposition"]
+    return answer.content.decode("utf-8-sig")
+
+
+async def test_the_html_file_needs_nothing_else(server: Server) -> None:
+    page = await exported(server, "html")
+    assert "2 differ, " in page
+    assert "50.0 °C" in page
+    assert "49.0 °C" in page
+    assert "TWIN" in page
+    assert not re.findall(r"<(?:script|link|img|iframe)|src=|href=|url\(", page)
+    assert "default-src 'none'" in page
+    assert "2 verschieden, " in await exported(server, "html", "de")
+
+
+async def test_the_csv_file_has_a_row_a_difference_and_one_a_bit(server: Server) -> None:
+    rows = list(csv.DictReader(io.StringIO(await exported(server, "csv"))))
+    live, editor = f"{PMM}, now (RAM)", f"{PMM}, editor"
+    (limit,) = [one for one in rows if one["address"] == "3110:01"]
+    assert (limit[live], limit[f"{live}: raw"], limit[editor], limit["state"]) == (
+        "50.0 °C",
+        "500",
+        "49.0 °C",
+        "different",
+    )
+    mask, *bits = [one for one in rows if one["address"] == "3300:01"]
+    before, after = int(mask[f"{live}: raw"]), int(mask[f"{editor}: raw"])
+    assert {int(one["bit"]) for one in bits} == {bit for bit in range(16) if (before ^ after) >> bit & 1}
+    everything = list(csv.DictReader(io.StringIO(await exported(server, "csv", same=True))))
+    assert len(everything) > 90 > len(rows)

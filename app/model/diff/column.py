@@ -10,11 +10,9 @@ from typing import Final
 from app.model.address import Address
 from app.model.datatypes import Raw
 from app.model.description import Description, Entry, Quantity, QuantityRule
+from app.model.set_head import NOT_IN_FILE
 from app.model.set_vector import exact
 from app.model.values import quantity_of, show, to_scaled
-
-NO_SUCH_OBJECT: Final = frozenset({"abort 06020000h", "abort 06090011h"})
-"""Reasons of a set for an unread object: the device has no such object, or no such sub-index (CiA 301, table 22)."""
 
 
 class CellState(Enum):
@@ -29,6 +27,14 @@ class CellState(Enum):
     NOT_ON_DEVICE = "not-on-device"
     UNREAD = "unread"
     EMPTY = "empty"
+
+
+_WHY_NOT: Final = {
+    "abort 06020000h": CellState.NOT_ON_DEVICE,
+    "abort 06090011h": CellState.NOT_ON_DEVICE,
+    NOT_IN_FILE: CellState.NOT_IN_SET,
+}
+"""Reasons of a set for an unread object: no such object, no such sub-index (CiA 301, table 22), a partial file."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +70,7 @@ class Column:
         if address in self.empty:
             return CellState.EMPTY
         if address in self.unread:
-            return CellState.NOT_ON_DEVICE if self.unread[address] in NO_SUCH_OBJECT else CellState.UNREAD
+            return _WHY_NOT.get(self.unread[address], CellState.UNREAD)
         return CellState.NOT_IN_SET if address in self.description.entries else CellState.NOT_ON_DEVICE
 
     def cell(self, address: Address) -> Cell:

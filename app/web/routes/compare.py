@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from fastapi import APIRouter, Query
+from fastapi import APIRouter, Query, Request, Response
 
 from app.errors import NotConnectedError
 from app.service.compare.comparison import compare_columns
+from app.service.compare.export import to_csv, to_html
 from app.service.compare.fleet import compare_fleet
 from app.service.compare.ground import ground_of
 from app.service.compare.parity import compare_blades
@@ -16,6 +17,7 @@ from app.service.compare.spec import ColumnKind, ColumnSpec
 from app.web.deps import BenchOf
 from app.web.models.compare import CompareRequest, ComparisonDoc
 from app.web.models.fleet import FleetDoc, FleetRequest, ParityDoc, ParityPart
+from app.web.problem import texts_for
 
 router = APIRouter()
 
@@ -26,6 +28,28 @@ async def compare(bench: BenchOf, request: CompareRequest) -> ComparisonDoc:
     columns = Columns(ground_of(bench))
     pending = columns.read_pending(request.pending)
     return ComparisonDoc.of(await compare_columns(columns, request.columns, pending, request.all))
+
+
+@router.post("/compare/export", response_class=Response)
+async def export_comparison(
+    bench: BenchOf,
+    asked: Request,
+    request: CompareRequest,
+    file_format: Annotated[Literal["html", "csv"], Query(alias="format")] = "html",
+    same: Annotated[bool, Query(description="With the rows that match")] = False,
+) -> Response:
+    """The comparison as a file of its own, in the language that was asked for."""
+    columns = Columns(ground_of(bench))
+    pending = columns.read_pending(request.pending)
+    compared = await compare_columns(columns, request.columns, pending, request.all)
+    texts = texts_for(asked.headers.get("accept-language"), asked.app.state.language)
+    name = f'attachment; filename="comparison.{file_format}"'
+    if file_format == "csv":
+        # With a byte order mark: without one, spreadsheets take UTF-8 for an old code page.
+        content, kind = to_csv(compared, texts, same).encode("utf-8-sig"), "text/csv; charset=utf-8"
+    else:
+        content, kind = to_html(compared, texts, same).encode(), "text/html; charset=utf-8"
+    return Response(content, media_type=kind, headers={"Content-Disposition": name})
 
 
 @router.get("/parity")

@@ -84,6 +84,46 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/compare/export": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Export Comparison
+         * @description The comparison as a file of its own, in the language that was asked for.
+         */
+        post: operations["export_comparison"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/descriptions/{description_id}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Known Description
+         * @description The description of a kind of device, connected or not.
+         */
+        get: operations["known_description"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/favourites/{description_id}": {
         parameters: {
             query?: never;
@@ -1130,6 +1170,30 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/nameplates": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Nameplates
+         * @description The serial numbers that were typed, by device.
+         */
+        get: operations["nameplates"];
+        /**
+         * Put Nameplate
+         * @description Keep the serial number on a device's plate; it must be the same twice.
+         */
+        put: operations["put_nameplate"];
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/parity": {
         parameters: {
             query?: never;
@@ -1250,6 +1314,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/recordings/{name}/recover-sets": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Recover
+         * @description Take what the SDO traffic of a recording showed of each device into the library.
+         */
+        post: operations["recover"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/rules": {
         parameters: {
             query?: never;
@@ -1319,7 +1403,7 @@ export interface paths {
         };
         /**
          * Sets
-         * @description The set files, latest first. Those without head and reason are filled in by the next requests.
+         * @description The library, latest first, after a look at the set files of the data folder.
          */
         get: operations["sets"];
         put?: never;
@@ -1330,7 +1414,27 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
-    "/api/sets/{turbine}/{file}": {
+    "/api/sets/import": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Import Set
+         * @description Take a file into the library: JSON, DCF or CSV. A file that is damaged gives line and reason, and no set.
+         */
+        post: operations["import_set"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/sets/{key}": {
         parameters: {
             query?: never;
             header?: never;
@@ -1339,7 +1443,7 @@ export interface paths {
         };
         /**
          * Parameter Set
-         * @description One set with all its values.
+         * @description One set with all its values; by its id, or by 8 or more digits of its hash.
          */
         get: operations["parameter_set"];
         put?: never;
@@ -1350,7 +1454,7 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
-    "/api/sets/{turbine}/{file}/download": {
+    "/api/sets/{key}/download": {
         parameters: {
             query?: never;
             header?: never;
@@ -1359,11 +1463,31 @@ export interface paths {
         };
         /**
          * Download Set
-         * @description The set file as it is.
+         * @description The set as a file: canonical JSON, DCF (CANopen devices only) or CSV.
          */
         get: operations["download_set"];
         put?: never;
         post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/sets/{key}/tags": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Tag Set
+         * @description Give a set a tag, or take it off; which set is golden is for experts to say.
+         */
+        post: operations["tag_set"];
         delete?: never;
         options?: never;
         head?: never;
@@ -1983,6 +2107,18 @@ export interface components {
              * Reason
              * @default
              */
+            reason: string;
+        };
+        /**
+         * BadSetFile
+         * @description A file of the data folder that is no set, and why.
+         */
+        BadSetFile: {
+            /** Line */
+            line: number;
+            /** Name */
+            name: string;
+            /** Reason */
             reason: string;
         };
         /**
@@ -3392,6 +3528,49 @@ export interface components {
             unchanged: components["schemas"]["MotorDoc"][];
         };
         /**
+         * NamelessNode
+         * @description A node of a recording with values of which it is not told what it is.
+         */
+        NamelessNode: {
+            /** Bus */
+            bus: string;
+            /** Node */
+            node: number;
+            /** Values */
+            values: number;
+        };
+        /**
+         * NameplateDoc
+         * @description The serial number on the plate of a device, as a person typed it.
+         */
+        NameplateDoc: {
+            /** Device */
+            device: string;
+            /** Person */
+            person: string;
+            /** Serial */
+            serial: string;
+            /** T Ns */
+            t_ns: number;
+        };
+        /**
+         * NameplateTyped
+         * @description The serial number, typed twice.
+         * @example {
+         *       "again": "P-20417",
+         *       "device": "wtg-07/blade-2/pmc",
+         *       "serial": "P-20417"
+         *     }
+         */
+        NameplateTyped: {
+            /** Again */
+            again: string;
+            /** Device */
+            device: string;
+            /** Serial */
+            serial: string;
+        };
+        /**
          * NewUser
          * @description A user to be made. The first one is an expert, whatever role is named.
          */
@@ -3935,6 +4114,33 @@ export interface components {
             started_ns: number | null;
             /** Turbine */
             turbine: string;
+        };
+        /**
+         * RecoveredSet
+         * @description A set out of a recording: how many values were read and written, and how many something happened to since.
+         */
+        RecoveredSet: {
+            /** Doubtful */
+            doubtful: number;
+            /** Read */
+            read: number;
+            record: components["schemas"]["SetRecordDoc"];
+            /** Unknown */
+            unknown: string[];
+            /** Written */
+            written: number;
+        };
+        /**
+         * RecoveredSets
+         * @description What a recording gave; ``damages`` counts places in the file that could not be used.
+         */
+        RecoveredSets: {
+            /** Damages */
+            damages: number;
+            /** Nameless */
+            nameless: components["schemas"]["NamelessNode"][];
+            /** Sets */
+            sets: components["schemas"]["RecoveredSet"][];
         };
         /**
          * RestartDone
@@ -4619,6 +4825,23 @@ export interface components {
             /** Connection */
             connection: string;
         };
+        /**
+         * SeenDoc
+         * @description How a value was seen in a recording. ``doubt``: what happened since, so that it may be another one.
+         */
+        SeenDoc: {
+            /**
+             * Access
+             * @enum {string}
+             */
+            access: "read" | "write";
+            /** Doubt */
+            doubt: ("boot-up" | "gap") | null;
+            /** Ours */
+            ours: boolean;
+            /** T Ns */
+            t_ns: number;
+        };
         ServerMessage: components["schemas"]["HelloMessage"] | components["schemas"]["BenchMessage"] | components["schemas"]["HeartbeatMessage"] | components["schemas"]["LinkMessage"] | components["schemas"]["NodesMessage"] | components["schemas"]["AxesMessage"] | components["schemas"]["RotorMessage"] | components["schemas"]["InstructorMessage"] | components["schemas"]["ValuesMessage"] | components["schemas"]["EventMessage"] | components["schemas"]["TraceMessage"];
         /**
          * Session
@@ -4651,15 +4874,19 @@ export interface components {
         /**
          * SetDoc
          * @description One set: raw values by address, and the objects that were not read, each with the reason.
+         *
+         *     ``seen`` and ``recording`` are null where the set comes from no recording.
          */
         SetDoc: {
             /** Empty */
             empty: string[];
-            head: components["schemas"]["SetHead"];
-            /** Name */
-            name: string;
-            /** Path */
-            path: string;
+            record: components["schemas"]["SetRecordDoc"];
+            /** Recording */
+            recording: string | null;
+            /** Seen */
+            seen: {
+                [key: string]: components["schemas"]["SeenDoc"];
+            } | null;
             /** Unread */
             unread: {
                 [key: string]: string;
@@ -4670,28 +4897,8 @@ export interface components {
             };
         };
         /**
-         * SetHead
-         * @description What a set says of itself: who it is of, and how many objects were read, not read, and empty.
-         */
-        SetHead: {
-            /** Description Id */
-            description_id: string;
-            /** Description Version */
-            description_version: string;
-            /** Empty */
-            empty: number;
-            /** Hash */
-            hash: string;
-            identity: components["schemas"]["SetIdentity"];
-            origin: components["schemas"]["SetOrigin"];
-            /** Unread */
-            unread: number;
-            /** Values */
-            values: number;
-        };
-        /**
          * SetIdentity
-         * @description What the device said of itself; null where it did not answer.
+         * @description What the device said of itself, null where it did not answer; ``nameplate`` is what a person typed.
          */
         SetIdentity: {
             /** Device Name */
@@ -4700,6 +4907,8 @@ export interface components {
             device_type: number | null;
             /** Hardware */
             hardware: string | null;
+            /** Nameplate */
+            nameplate: string | null;
             /** Product Code */
             product_code: number | null;
             /** Revision */
@@ -4712,14 +4921,51 @@ export interface components {
             vendor_id: number | null;
         };
         /**
+         * SetImport
+         * @description A file as base64. ``device``: whose values they are where the file does not tell, or is not to (``as_values``).
+         *
+         *     ``description_id`` null: found out by the objects.
+         * @example {
+         *       "as_values": false,
+         *       "data": "W0ZpbGVJbmZvXQo=",
+         *       "device": "wtg-07/blade-2/pmc",
+         *       "name": "axis-2.dcf",
+         *       "reason": "from the maker"
+         *     }
+         */
+        SetImport: {
+            /**
+             * As Values
+             * @default false
+             */
+            as_values: boolean;
+            /** Data */
+            data: string;
+            /** Description Id */
+            description_id?: string | null;
+            /** Device */
+            device?: string | null;
+            /** Name */
+            name: string;
+            /**
+             * Reason
+             * @default
+             */
+            reason: string;
+        };
+        /**
          * SetList
-         * @description The set files of the data folder.
+         * @description The library. ``folder`` is looked through for set files; ``waiting`` of them are not read yet.
          */
         SetList: {
-            /** Files */
-            files: components["schemas"]["SetRef"][];
+            /** Bad */
+            bad: components["schemas"]["BadSetFile"][];
             /** Folder */
-            folder: string;
+            folder: string | null;
+            /** Records */
+            records: components["schemas"]["SetRecordDoc"][];
+            /** Waiting */
+            waiting: number;
         };
         /**
          * SetOrigin
@@ -4740,21 +4986,69 @@ export interface components {
             tool: string;
             /** Turbine */
             turbine: string;
+            /** Work Order */
+            work_order: string;
         };
         /**
-         * SetRef
-         * @description One file. ``head`` null: not read yet, or not usable, then ``reason`` says why.
+         * SetRecordDoc
+         * @description One occasion on which a set was taken: whose, when, how many objects were read, not read, and empty.
          */
-        SetRef: {
-            head: components["schemas"]["SetHead"] | null;
-            /** Modified Ns */
-            modified_ns: number;
-            /** Name */
-            name: string;
-            /** Reason */
-            reason: string | null;
-            /** Size Bytes */
-            size_bytes: number;
+        SetRecordDoc: {
+            /** Description Id */
+            description_id: string;
+            /** Description Version */
+            description_version: string;
+            /** Empty */
+            empty: number;
+            /** Hash */
+            hash: string;
+            /** Id */
+            id: string;
+            identity: components["schemas"]["SetIdentity"];
+            origin: components["schemas"]["SetOrigin"];
+            /**
+             * Source
+             * @enum {string}
+             */
+            source: "backup" | "visit" | "file" | "recording" | "undo";
+            /** T Ns */
+            t_ns: number;
+            /** Tags */
+            tags: components["schemas"]["SetTag"][];
+            /** Unread */
+            unread: number;
+            /** Values */
+            values: number;
+        };
+        /**
+         * SetTag
+         * @description A tag that a set bears now: who gave it, and when. ``visit_id`` of as-found and as-left.
+         */
+        SetTag: {
+            /** Person */
+            person: string;
+            /** Scope */
+            scope: string;
+            /** T Ns */
+            t_ns: number;
+            /**
+             * Tag
+             * @enum {string}
+             */
+            tag: "as-delivered" | "golden" | "as-found" | "as-left";
+            /** Visit Id */
+            visit_id: string | null;
+        };
+        /**
+         * SetTaken
+         * @description The set that an import gave. ``foreign``: the file said nothing of itself.
+         */
+        SetTaken: {
+            /** Foreign */
+            foreign: boolean;
+            record: components["schemas"]["SetRecordDoc"];
+            /** Unknown */
+            unknown: components["schemas"]["UnknownObject"][];
         };
         /**
          * SettingsJobDoc
@@ -4943,6 +5237,23 @@ export interface components {
             unit: number;
             /** Unread */
             unread: number;
+        };
+        /**
+         * TagChange
+         * @description Give a set a tag, or take it off.
+         * @example {
+         *       "on": true,
+         *       "tag": "as-delivered"
+         *     }
+         */
+        TagChange: {
+            /** On */
+            on: boolean;
+            /**
+             * Tag
+             * @enum {string}
+             */
+            tag: "as-delivered" | "golden" | "as-found" | "as-left";
         };
         /**
          * TestRequest
@@ -5215,6 +5526,20 @@ export interface components {
             /** Revision */
             revision: string;
             turbine: components["schemas"]["SiteTurbineDoc"];
+        };
+        /**
+         * UnknownObject
+         * @description An object of a file that is not in the set, the line in which it stands, and why (text key).
+         */
+        UnknownObject: {
+            /** Address */
+            address: string;
+            /** Line */
+            line: number;
+            /** Name */
+            name: string;
+            /** Text Key */
+            text_key: string;
         };
         /**
          * UnknownValue
@@ -5694,6 +6019,137 @@ export interface operations {
             };
             /** @description Unprocessable Entity */
             422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    export_comparison: {
+        parameters: {
+            query?: {
+                format?: "html" | "csv";
+                /** @description With the rows that match */
+                same?: boolean;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "columns": [
+                 *         "live:wtg-07/blade-1/pmc",
+                 *         "default:wtg-07/blade-1/pmc"
+                 *       ],
+                 *       "pending": {}
+                 *     }
+                 */
+                "application/json": components["schemas"]["CompareRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    known_description: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                description_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": {
+                        [key: string]: unknown;
+                    };
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -9784,6 +10240,120 @@ export interface operations {
             };
         };
     };
+    nameplates: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["NameplateDoc"][];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    put_nameplate: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "again": "P-20417",
+                 *       "device": "wtg-07/blade-2/pmc",
+                 *       "serial": "P-20417"
+                 *     }
+                 */
+                "application/json": components["schemas"]["NameplateTyped"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["NameplateDoc"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
     parity: {
         parameters: {
             query?: {
@@ -10139,6 +10709,64 @@ export interface operations {
             };
         };
     };
+    recover: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                name: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["RecoveredSets"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
     rules: {
         parameters: {
             query?: never;
@@ -10305,7 +10933,13 @@ export interface operations {
     };
     sets: {
         parameters: {
-            query?: never;
+            query?: {
+                turbine?: string | null;
+                device?: string | null;
+                description_id?: string | null;
+                tag?: ("as-delivered" | "golden" | "as-found" | "as-left") | null;
+                limit?: number;
+            };
             header?: never;
             path?: never;
             cookie?: never;
@@ -10339,6 +10973,84 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    import_set: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "as_values": false,
+                 *       "data": "W0ZpbGVJbmZvXQo=",
+                 *       "device": "wtg-07/blade-2/pmc",
+                 *       "name": "axis-2.dcf",
+                 *       "reason": "from the maker"
+                 *     }
+                 */
+                "application/json": components["schemas"]["SetImport"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SetTaken"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description Anything else that went wrong */
             default: {
                 headers: {
@@ -10355,8 +11067,7 @@ export interface operations {
             query?: never;
             header?: never;
             path: {
-                turbine: string;
-                file: string;
+                key: string;
             };
             cookie?: never;
         };
@@ -10411,11 +11122,12 @@ export interface operations {
     };
     download_set: {
         parameters: {
-            query?: never;
+            query?: {
+                format?: "json" | "dcf" | "csv";
+            };
             header?: never;
             path: {
-                turbine: string;
-                file: string;
+                key: string;
             };
             cookie?: never;
         };
@@ -10426,7 +11138,9 @@ export interface operations {
                 headers: {
                     [name: string]: unknown;
                 };
-                content?: never;
+                content: {
+                    "application/json": unknown;
+                };
             };
             /** @description Unauthorized */
             401: {
@@ -10448,6 +11162,92 @@ export interface operations {
             };
             /** @description Not Found */
             404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    tag_set: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                key: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "on": true,
+                 *       "tag": "as-delivered"
+                 *     }
+                 */
+                "application/json": components["schemas"]["TagChange"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SetRecordDoc"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
                 headers: {
                     [name: string]: unknown;
                 };

@@ -1,0 +1,102 @@
+"""A comparison in words: titles of columns, values, states, and the one sentence that sums up."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from app.model.diff.bits import BitRow
+from app.model.diff.column import Cell, CellState
+from app.model.diff.compare import Row, RowState, Summary
+from app.model.sets import iso_time
+from app.model.texts import Texts
+from app.service.compare.sources import Shown
+from app.service.compare.spec import ColumnKind
+from app.service.records.view import visible
+
+DASH: Final = "–"
+_ALWAYS: Final = ("different", "same", "unit", "missing")
+_WHERE_ANY: Final = ("not_comparable", "unread")
+
+
+class Words:
+    """Says it in one language."""
+
+    def __init__(self, texts: Texts) -> None:
+        self.texts = texts
+
+    def sentence(self, summary: Summary) -> str:
+        """``7 differ, 120 match, 2 bound to this unit, 0 not found``, and what else there is."""
+        counts = {part: int(getattr(summary, part)) for part in (*_ALWAYS, *_WHERE_ANY)}
+        return ", ".join(
+            self.texts(f"page.compare.sum.{part}{'_one' if count == 1 else ''}", count=count)
+            for part, count in counts.items()
+            if part in _ALWAYS or count
+        )
+
+    def source(self, shown: Shown) -> str:
+        """``as left``, ``file pmc.json``."""
+        source = self.texts(f"page.compare.source.{shown.spec.kind.value}")
+        if shown.spec.kind in (ColumnKind.FILE, ColumnKind.SET):
+            return f"{source} {visible(shown.spec.of)}"
+        return source
+
+    def title(self, shown: Shown) -> str:
+        """``wtg-07/blade-2/pmc, as left``."""
+        return f"{visible(shown.column.slug)}, {self.source(shown)}"
+
+    def circumstances(self, shown: Shown) -> list[str]:
+        """When, by whom, why, which content, and what it is of; each where it is known."""
+        column = shown.column
+        when = "" if shown.t_ns is None else iso_time(shown.t_ns)[:16].replace("T", " ") + " UTC"
+        described = f"{column.description.id} {column.version}"
+        digest = "" if shown.hash is None else f"sha256:{shown.hash[:16]}"
+        twin = self.texts("compare.twin") if shown.twin else ""
+        unread = "" if shown.complete else self.texts("compare.incomplete", count=len(column.unread))
+        parts = (when, shown.person, shown.reason, described, digest, unread, twin)
+        return [visible(part) for part in parts if part]
+
+    def value(self, cell: Cell) -> str:
+        """A cell with its unit, or why there is no value."""
+        if cell.state is not CellState.VALUE:
+            return self.texts(f"page.compare.absence.{cell.state.value}")
+        name = "" if cell.text_key is None else f" {self.texts(cell.text_key)}"
+        return visible(f"{cell.shown} {cell.unit}".rstrip()) + name
+
+    def state(self, row: Row) -> str:
+        """``differs``."""
+        return self.texts(f"page.compare.row.{row.state.value}")
+
+    def restore(self, row: Row) -> str:
+        """The class, where it is worth a word."""
+        word = row.entry.restore.value
+        return "" if word == "copy" else self.texts(f"page.compare.class.{word}")
+
+    def name(self, row: Row) -> str:
+        """What the parameter is called."""
+        return self.texts.name(row.entry.title)
+
+    def group(self, row: Row) -> str:
+        """The group that it belongs to."""
+        key = f"group.{row.entry.group}"
+        words = self.texts(key)
+        return row.entry.group if words == key else words
+
+    def bit(self, bit: BitRow) -> str:
+        """A bit with its clamp."""
+        number = str(bit.bit) if bit.bit == bit.last else f"{bit.bit}..{bit.last}"
+        name = self.texts("page.compare.bit_unnamed") if bit.text_key is None else self.texts(bit.text_key)
+        clamp = f" ({bit.clamp})" if bit.clamp else ""
+        return f"{self.texts('page.compare.bit', bit=number)}: {name}{clamp}"
+
+    def bit_value(self, bit: BitRow, number: int | None) -> str:
+        """On or off, or the number of a field of several bits."""
+        if number is None:
+            return DASH
+        if bit.bit != bit.last:
+            return str(number)
+        return self.texts("page.compare.on" if number else "page.compare.off")
+
+
+def rows_of(rows: tuple[Row, ...], same: bool) -> list[Row]:
+    """What is told: the differences, or all."""
+    return [row for row in rows if same or row.state is not RowState.SAME]
