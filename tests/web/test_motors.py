@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 from collections.abc import AsyncIterator
+from contextlib import aclosing
 from typing import Any
 
 import httpx
@@ -95,7 +96,7 @@ async def test_what_does_not_fit_is_refused_with_its_reason(server: Server) -> N
 async def test_only_an_expert_deletes(server: Server) -> None:
     anna = await with_anna(server)
     await anna.post("/api/users", json={**BEN, "role": "technician"})
-    async with await log_in(server, BEN) as ben:
+    async with aclosing(await log_in(server, BEN)) as ben:
         motor = await added(ben)
         here = f"/api/motors/{motor['id']}"
         answer = await ben.delete(here)
