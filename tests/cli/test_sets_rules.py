@@ -76,7 +76,7 @@ def test_a_note_or_warning_is_told_and_is_no_error(tmp_path: Path, capsys: Captu
     station = healthy(pmm={"30E3": 0})
     files = [write(tmp_path, station, kind) for kind in (PMM, PMC)]
     assert main(["sets", "check", *files]) == 0
-    assert "The cycle is 0: no automatic test (As delivered by default: 30E3)" in capsys.readouterr().out
+    assert "The cycle is 0: no automatic test (30E3 still holds its default)" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("given", ([], ["a.json", "--can", "socketcand:127.0.0.1:1"]), ids=("neither", "both"))

@@ -34,7 +34,7 @@ def pmc(address: str) -> Object:
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """One thing that is wrong: the objects to mark and what fills the text's placeholders."""
+    """One thing that is wrong: the objects to mark, first the one to mend, and what fills the text's placeholders."""
 
     objects: tuple[Object, ...]
     details: Mapping[str, Detail] = field(default_factory=dict)
@@ -82,12 +82,8 @@ class Look:
             return device_name(one)
         return parse_address(one.address).short
 
-    def at_default(self, objects: Iterable[Object]) -> str:
-        """Addresses of those that hold the default of the description: what is wrong was never set."""
-        held = (one for one in objects if self._holds_default(one))
-        return ", ".join(parse_address(one.address).short for one in held)
-
-    def _holds_default(self, one: Object) -> bool:
+    def holds_default(self, one: Object) -> bool:
+        """True where the object holds the default of its description: what is wrong was never set."""
         device, address = self._station.of_kind(one.description_id), parse_address(one.address)
         entry = None if device is None else device.description.entries.get(address)
         if device is None or entry is None or entry.default is None:
@@ -131,11 +127,17 @@ def _findings(station: StationValues, rule_id: str, severity: Severity, judge: J
     look = Look(station)
     try:
         for found in judge(look):
-            default = look.at_default(found.objects)
-            details = {**found.details, "at_default": default} if default else found.details
-            yield Finding(rule_id, severity, Verdict.BROKEN, look.places(found.objects), details)
+            yield Finding(rule_id, severity, Verdict.BROKEN, look.places(found.objects), _details(look, found))
     except NotKnownError:
         pass  # what is missing was noted, and is told below
     if look.missing:
         names = ", ".join(dict.fromkeys(look.told(one) for one in look.missing))
         yield Finding(rule_id, severity, Verdict.NOT_CHECKED, look.places(look.missing), {"missing": names})
+
+
+def _details(look: Look, found: Found) -> Mapping[str, Detail]:
+    """Those of the text, and ``at_default`` where the object to mend stands as delivered by the manual."""
+    first = found.objects[0]
+    if not look.holds_default(first):
+        return found.details
+    return {**found.details, "at_default": parse_address(first.address).short}

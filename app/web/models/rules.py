@@ -76,7 +76,7 @@ class RulePlace(BaseModel):
 class RuleFinding(BaseModel):
     """What one rule says. Not checked: the text is ``rule.not_checked``. ``details`` fill the text's placeholders.
 
-    A detail ``at_default`` names objects that hold their default; its text is ``rule.at_default``.
+    A detail ``at_default`` names the object to mend where it holds its default; its text is ``rule.at_default``.
     """
 
     rule: str

@@ -1,7 +1,15 @@
 import { describe, expect, it } from "vitest";
 import type { RuleDoc, RuleFinding, StationFindings } from "../api/rules";
 import { translator } from "../texts/texts";
-import { about, byPlace, lineOfFinding, pendingOf, stationOf, touching } from "./ruleFindings";
+import {
+  about,
+  byPlace,
+  lineOfFinding,
+  pendingOf,
+  reasonOfFinding,
+  stationOf,
+  touching,
+} from "./ruleFindings";
 
 const PMM = "w/blade-1/pmm";
 const PMC = "w/blade-1/pmc";
@@ -77,15 +85,22 @@ describe("a finding in words", () => {
     {
       "rule.oat.dc_link_ladder.broken": "{lower} = {lower_v} V",
       "rule.not_checked": "Not checked: {missing}",
-      "rule.at_default": "default: {at_default}",
+      "rule.oat.dc_link_ladder.title": "Order",
+      "rule.oat.dc_link_ladder.why": "They act on one voltage.",
+      "rule.at_default": "{at_default} holds its default",
+      "page.rules.rule": "Rule: {title}.",
     },
     "en",
   );
 
-  it("names the values, what stands at its default, and what is missing", () => {
+  it("names the values, or what is missing", () => {
     expect(lineOfFinding(LADDER, t)).toBe("6510:04 = 410 V");
-    const standing = { ...LADDER, details: { ...LADDER.details, at_default: "6510:04" } };
-    expect(lineOfFinding(standing, t)).toBe("6510:04 = 410 V (default: 6510:04)");
     expect(lineOfFinding(UNJUDGED, t)).toBe("Not checked: 30FC:01");
+  });
+
+  it("has the rule behind it, and says where a value was never set", () => {
+    expect(reasonOfFinding(LADDER, t)).toBe("Rule: Order. They act on one voltage.");
+    const standing = { ...LADDER, details: { at_default: "6510:04" } };
+    expect(reasonOfFinding(standing, t)).toMatch(/voltage\. 6510:04 holds its default\.$/);
   });
 });

@@ -58,11 +58,15 @@ export const touching = (findings: readonly RuleFinding[], pending: PendingValue
       isBroken(one) && one.places.some(({ device, address }) => pending[device]?.[address] !== undefined),
   );
 
-/** A finding in one line. */
-export function lineOfFinding(finding: RuleFinding, t: Translate): string {
-  if (!isBroken(finding)) return t("rule.not_checked", finding.details);
-  const said = t(`rule.${finding.rule}.broken`, finding.details);
-  return "at_default" in finding.details ? `${said} (${t("rule.at_default", finding.details)})` : said;
+/** What is wrong, or not known, in one line. */
+export const lineOfFinding = (finding: RuleFinding, t: Translate): string =>
+  t(isBroken(finding) ? `rule.${finding.rule}.broken` : "rule.not_checked", finding.details);
+
+/** The rule behind a finding: what should be, why, and whether the value was ever set. */
+export function reasonOfFinding({ rule, details }: RuleFinding, t: Translate): string {
+  const said = [t("page.rules.rule", { title: t(`rule.${rule}.title`) }), t(`rule.${rule}.why`)];
+  if ("at_default" in details) said.push(`${t("rule.at_default", details)}.`);
+  return said.join(" ");
 }
 
 /** Several findings of one rule differ by their places. */

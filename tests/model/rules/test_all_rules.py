@@ -60,7 +60,7 @@ def test_the_default_velocity_is_found_too_high_for_the_pitch_gear_and_named_as_
         "highest_dps": 10.63,
         "highest_raw": 1063,
         "speed_rpm": 3000,
-        "at_default": "607F, 6080",
+        "at_default": "607F",
     }
 
 

@@ -23,7 +23,7 @@ def test_a_broken_rung_names_both_places_over_both_devices() -> None:
     assert (found.verdict, found.severity) == (Verdict.BROKEN, Severity.ERROR)
     assert found.places == (place(PMC, "6510:04"), place(PMM, "30FA:03"))
     names = {"lower": "6510:04", "upper": "30FA:03"}
-    assert found.details == {**names, "lower_v": 400, "upper_v": 400, "at_default": "30FA:03"}
+    assert found.details == {**names, "lower_v": 400, "upper_v": 400}
     assert broken_stepwise(station(pmc={"6510:04": 400}), RULES) == {("oat.dc_link_ladder", found.places)}
 
 

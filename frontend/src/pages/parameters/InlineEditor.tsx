@@ -82,8 +82,7 @@ export function InlineEditor({ entry, device, onDone }: Props) {
         data-rule={draft.error === null && broken !== undefined ? broken.severity : undefined}
         role="status"
       >
-        {draft.error ??
-          (broken ? `${t(`rule.${broken.rule}.title`)}: ${lineOfFinding(broken, t)}` : draft.hint)}
+        {draft.error ?? (broken ? lineOfFinding(broken, t) : draft.hint)}
       </span>
     </span>
   );

@@ -10,7 +10,7 @@ import { useMemo } from "react";
 import type { RuleFinding, RuleSeverity } from "../../api/rules";
 import { turbineQuery } from "../../api/queries";
 import { titleOf } from "../../model/rows";
-import { findingKey, isBroken, lineOfFinding } from "../../model/ruleFindings";
+import { findingKey, isBroken, lineOfFinding, reasonOfFinding } from "../../model/ruleFindings";
 import { useTexts } from "../../texts/texts";
 import { placesOf, useDeviceName } from "../../ui/devices";
 import { useContexts } from "./devicesOf";
@@ -75,9 +75,8 @@ function Broken({ finding, here, onJump }: Omit<Props, "findings"> & { finding: 
     <li data-severity={finding.severity} data-testid={`rule-${finding.rule}`}>
       <Icon size={17} role="img" aria-label={t(`rule.severity.${finding.severity}`)} />
       <div>
-        <b>{t(`rule.${finding.rule}.title`)}</b>
-        <p>{lineOfFinding(finding, t)}</p>
-        <small>{t(`rule.${finding.rule}.why`)}</small>
+        <b>{lineOfFinding(finding, t)}</b>
+        <small>{reasonOfFinding(finding, t)}</small>
         <Jumps places={others} onJump={onJump} />
       </div>
     </li>

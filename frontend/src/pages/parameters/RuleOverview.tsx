@@ -35,7 +35,8 @@ export function RuleButton() {
       onClick={() => update({ findings: "open" })}
       data-testid="rules-open"
     >
-      {t("page.rules.button")} <Counts findings={stations.flatMap((one) => one.findings)} />
+      {t("page.rules.button")}
+      <Counts findings={stations.flatMap((one) => one.findings)} />
     </Button>
   );
 }
@@ -83,13 +84,20 @@ export function RuleOverview({ places, onClose }: { places: readonly Place[]; on
             {t("page.rules.failed")}
           </Alert>
         )}
-        {stations.map((one) => (
+        {[...stations].sort(byErrors).map((one) => (
           <Station key={one.station} station={one} places={places} onJump={jump} />
         ))}
       </Stack>
     </Modal>
   );
 }
+
+const errorsOf = (one: StationFindings): number =>
+  one.findings.filter((finding) => isBroken(finding) && finding.severity === "error").length;
+
+/** Stations with errors come first, else they stay in their order. */
+const byErrors = (a: StationFindings, b: StationFindings): number =>
+  Number(errorsOf(b) > 0) - Number(errorsOf(a) > 0);
 
 interface StationProps {
   station: StationFindings;
