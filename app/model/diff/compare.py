@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
+from typing import Final
 
 from app.model.address import Address
 from app.model.description import BitTable, Entry, RestoreClass
@@ -79,10 +80,14 @@ def is_parameter(entry: Entry) -> bool:
     return entry.saved and entry.restore is not RestoreClass.NEVER
 
 
+_NOWHERE: Final = (CellState.NOT_IN_SET, CellState.NOT_ON_DEVICE)
+
+
 def compare(columns: Sequence[Column], everything: bool = False) -> Comparison:
-    """Compare ``columns``: parameters only, or ``everything`` that any of them can read or has."""
-    rows = tuple(_row(entry, columns) for entry in _entries(columns, everything))
-    return Comparison(rows, summary_of(rows))
+    """Compare ``columns``: parameters only, or ``everything`` that can be read. What none of them has is no row."""
+    rows = (_row(entry, columns) for entry in _entries(columns, everything))
+    kept = tuple(row for row in rows if not all(cell.state in _NOWHERE for cell in row.cells))
+    return Comparison(kept, summary_of(kept))
 
 
 def summary_of(rows: Sequence[Row]) -> Summary:
