@@ -23,7 +23,6 @@ from app.model.datatypes import Raw
 from app.model.description import RestoreClass
 from app.model.restore.plan import Step, StepKind
 from app.model.station import Place, StationValues
-from app.service.backup import read_device
 from app.service.connection import Connection
 from app.service.devices import Target
 from app.service.journal import Journal
@@ -37,6 +36,7 @@ from app.service.restore.survey import (
     boots_of,
     is_driven,
     read_integer,
+    read_whole,
 )
 from app.service.save import restart, save
 from app.service.write import write_raw
@@ -210,7 +210,7 @@ class Hands:
         try:
             for slug, target in self.targets.items():
                 wanted = {place.address: raw for place, raw in goals.items() if place.slug == slug}
-                report = await read_device(self.connection.driver(target), target, wanted)
+                report = await read_whole(self.connection.driver(target), target, wanted)
                 _compare(Cause.CHANGED, slug, wanted, report.values)
         except HubsideError as error:
             raise Broken(cause_of(error), "", error) from error

@@ -7,12 +7,14 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Final
 
+from app.drivers.contract import Driver
 from app.errors import HubsideError, NoAnswerError, UsageError
 from app.model.address import Address
+from app.model.datatypes import Raw
 from app.model.restore.wanted import DeviceState
 from app.model.sets import ParameterSet
 from app.model.station import StationValues, station_of
-from app.service.backup import ReadReport, read_device, to_set
+from app.service.backup import DeviceProgress, ReadReport, read_device, readable, to_set
 from app.service.connection import Connection
 from app.service.devices import Target
 
@@ -24,6 +26,8 @@ _STAGE_ON: Final = (0x23, 0x27, 0x07)
 _DRIVEN: Final = (0x27, 0x07)
 STANDSTILL: Final = 10
 """Velocity in position units a second up to which an axis stands: 0.1 degrees a second as delivered."""
+PIECE: Final = 16
+"""So many objects are asked for before it is looked whether the device answers at all."""
 Progress = Callable[[int, int], None]
 
 
@@ -54,10 +58,8 @@ async def survey(
         if on_progress is not None:
             on_progress(sum(one for one, _ in done.values()), sum(one for _, one in done.values()))
 
-    reading = (read_device(connection.driver(target), target, None, progress) for target in targets)
+    reading = (read_whole(connection.driver(target), target, None, progress) for target in targets)
     reports = tuple(await asyncio.gather(*reading))
-    for report in reports:
-        _raise_where_dead(report)
     turbine, wall_ns = connection.turbine.slug, connection.stamper()
     sets = {one.target.slug: to_set(one, turbine, person, reason, wall_ns) for one in reports}
     return Survey(
@@ -69,15 +71,31 @@ async def survey(
     )
 
 
-def _raise_where_dead(report: ReadReport) -> None:
-    """A device that falls silent half-way is not known: a plan would take what it did not tell for unreadable."""
-    if report.lost is not None:
-        raise report.lost
-    silent = (error for error in report.failed.values() if isinstance(error, NoAnswerError))
-    if (error := next(silent, None)) is not None:
-        raise error
-    if not report.values and report.failed:
-        raise next(iter(report.failed.values()))
+async def read_whole(
+    driver: Driver,
+    target: Target,
+    addresses: Iterable[Address] | None = None,
+    on_progress: DeviceProgress | None = None,
+) -> ReadReport:
+    """Read a device as ``read_device`` does, piece by piece: one that falls silent is not waited for at every object.
+
+    Raises NoAnswerError where an object was not answered: a plan would take it for one that cannot be read.
+    """
+    wanted = readable(target.description) if addresses is None else list(addresses)
+    values: dict[Address, Raw] = {}
+    failed: dict[Address, HubsideError] = {}
+    for at in range(0, len(wanted), PIECE):
+        report = await read_device(driver, target, wanted[at : at + PIECE])
+        silent = (error for error in report.failed.values() if isinstance(error, NoAnswerError))
+        if (error := next(silent, None)) is not None:
+            raise report.lost or error
+        values |= report.values
+        failed |= report.failed
+        if on_progress is not None:
+            on_progress(target, len(values) + len(failed), len(wanted))
+    if not values and failed:
+        raise next(iter(failed.values()))
+    return ReadReport(target, values, failed)
 
 
 def state_of(report: ReadReport) -> DeviceState:
