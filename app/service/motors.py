@@ -22,7 +22,7 @@ from app.model.description import Description
 from app.model.description_file import load_builtin
 from app.model.motor import DESCRIPTION_ID, Draft, Motor, Source, checked, entries_of, wanted_values
 from app.model.motor_csv import FileRow, read_motors, write_motors
-from app.model.sets import IDENTITY, Origin, ParameterSet, identity_of, iso_time
+from app.model.sets import IDENTITY, Identity, Origin, ParameterSet, identity_of, iso_time
 from app.service.backup import read_device
 from app.service.devices import Target
 from app.service.office.audit import Action, AuditLog
@@ -32,7 +32,6 @@ from app.store.store import Store
 from app.store.uuid7 import Uuid7
 
 EXAMPLES: Final = "examples.csv"
-DEVICE_NAME: Final = IDENTITY["device_name"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -236,23 +235,27 @@ def live_motor(target: Target) -> dict[Address, int]:
     return _numbers((address, raw) for address, raw in seen if raw is not None)
 
 
-def motor_set(motor: Motor, target: Target, turbine: str, person: str, wall_ns: int) -> ParameterSet:
+async def read_identity(driver: Driver, target: Target) -> Identity:
+    """What a device says of itself, read over the wire. Raises BusLostError."""
+    report = await read_device(driver, target, [at for at in IDENTITY.values() if at in target.description.entries])
+    return identity_of(report.values)
+
+
+def motor_set(motor: Motor, target: Target, identity: Identity, turbine: str, person: str, t_ns: int) -> ParameterSet:
     """What a motor puts into a device, as a set of that device which holds nothing else: for a restore.
 
-    Its identity is what the device says of itself. Raises UsageError for another kind of device, MotorInventedError for
+    ``identity`` is what the device says of itself. Raises UsageError for another kind of device, MotorInventedError for
     an example and a device that does not say that it is simulated.
     """
     _check_kind(target)
-    name = target.lookup(DEVICE_NAME)
-    if motor.invented and not (isinstance(name, str) and name.startswith(TWIN_NAME)):
+    if motor.invented and not (identity.device_name or "").startswith(TWIN_NAME):
         raise MotorInventedError(motor=motor.title)
-    said = {address: raw for address in IDENTITY.values() if (raw := target.lookup(address)) is not None}
     reason = f"{motor.title} (motor {motor.id}, version {motor.version})"
     return ParameterSet(
         description_id=target.description.id,
         description_version=target.description.version,
-        identity=identity_of(said),
-        origin=Origin(turbine, target.slug, target.node, iso_time(wall_ns), person, reason, f"hubside {__version__}"),
+        identity=identity,
+        origin=Origin(turbine, target.slug, target.node, iso_time(t_ns), person, reason, f"hubside {__version__}"),
         values=dict(wanted_values(target.description, motor.draft.values)),
     )
 

@@ -80,6 +80,7 @@ def test_all_that_the_program_needs_is_inside(wheel: Path) -> None:
     inside = set(zipfile.ZipFile(wheel).namelist())
     wanted = {
         *(f"app/_bundle/od/{path.name}" for path in (ROOT / "od").glob("*.toml")),
+        *(f"app/_bundle/od/motors/{path.name}" for path in (ROOT / "od" / "motors").glob("*.csv")),
         *(f"app/_bundle/recordings/{path.name}" for path in (ROOT / "recordings").glob("*.mcap")),
         *(f"app/_bundle/sites/{path.name}" for path in (ROOT / "docs" / "sites").glob("*.toml")),
         *(f"app/locales/{path.name}" for path in (ROOT / "app" / "locales").glob("*.toml")),

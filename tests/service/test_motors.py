@@ -19,10 +19,10 @@ from app.errors import (
     NoAnswerError,
     UsageError,
 )
-from app.model.address import Address, parse_address
+from app.model.address import Address
 from app.model.motor import Draft, Plate, Source, entries_of
 from app.service.connection import Connection
-from app.service.motors import Motors, description, examples, live_motor, motor_set, read_motor
+from app.service.motors import Motors, description, examples, live_motor, motor_set, read_identity, read_motor
 from app.service.office.audit import AuditLog
 from app.service.write import write_raw
 from app.store import audit_rows
@@ -238,19 +238,21 @@ async def test_a_motor_becomes_a_set_of_its_drive_without_what_belongs_to_the_ma
     database: Database, connection: Connection
 ) -> None:
     target = connection.target(PMC)
-    await read_motor(connection.driver(target), target)
+    identity = await read_identity(connection.driver(target), target)
     motor = await database.motors.add(replace(DRAFT, values={VOLTAGE: 3900, RHO: 7}), "Anna")
-    found = motor_set(motor, target, "wtg-07", "Ben", 1_700_000_000_000_000_000)
+    found = motor_set(motor, target, identity, "wtg-07", "Ben", 1_700_000_000_000_000_000)
+    assert found.identity.device_type == 0x00020192
     assert found.values == {VOLTAGE: 3900}
     assert (found.origin.device, found.origin.person, found.description_id) == (PMC, "Ben", "oat-pmc")
     assert motor.id in found.origin.reason and motor.title in found.origin.reason
     with pytest.raises(UsageError):
-        motor_set(motor, connection.target("wtg-07/blade-1/pmm"), "wtg-07", "Ben", 0)
+        motor_set(motor, connection.target("wtg-07/blade-1/pmm"), identity, "wtg-07", "Ben", 0)
 
 
 async def test_an_example_goes_only_into_what_says_that_it_is_simulated(connection: Connection) -> None:
     target = connection.target(PMC)
-    with pytest.raises(MotorInventedError):
-        motor_set(examples()[0], target, "wtg-07", "Ben", 0)
-    await connection.driver(target).read(target.node, parse_address("1008"))
-    assert motor_set(examples()[0], target, "wtg-07", "Ben", 0).values[VOLTAGE] == 4000
+    identity = await read_identity(connection.driver(target), target)
+    assert motor_set(examples()[0], target, identity, "wtg-07", "Ben", 0).values[VOLTAGE] == 4000
+    for name in ("PMC", None):
+        with pytest.raises(MotorInventedError):
+            motor_set(examples()[0], target, replace(identity, device_name=name), "wtg-07", "Ben", 0)

@@ -13,7 +13,7 @@ from typing import Any, Final
 
 from app.errors import UsageError
 from app.service.connection import Connection
-from app.service.motors import Motors, motor_set
+from app.service.motors import Motors, motor_set, read_identity
 from app.service.restore.order import Given
 
 _SPEC: Final = re.compile(r"motor:([0-9a-f-]{36})@([0-9]{1,6}):(.+)", re.ASCII)
@@ -25,13 +25,17 @@ def is_motor(spec: str) -> bool:
 
 
 async def given_motor(motors: Motors, connection: Connection, spec: str, person: str) -> Given:
-    """What the motor puts into its drive. Raises UsageError, MotorUnknownError, MotorInventedError, StoreError."""
+    """What the motor puts into its drive, which is asked who it is.
+
+    Raises UsageError, MotorUnknownError, MotorInventedError, StoreError, BusLostError.
+    """
     found = _SPEC.fullmatch(spec)
     if found is None:
         raise UsageError(reason=f"'{spec}' is not motor:ID@VERSION:TURBINE/STATION/DEVICE")
     motor = await motors.get(found[1], int(found[2]))
     target = connection.target(found[3])
-    return Given(motor_set(motor, target, connection.turbine.slug, person, time.time_ns()), spec)
+    identity = await read_identity(connection.driver(target), target)
+    return Given(motor_set(motor, target, identity, connection.turbine.slug, person, time.time_ns()), spec)
 
 
 async def note_motors(motors: Motors, devices: Iterable[Mapping[str, Any]], person: str) -> None:

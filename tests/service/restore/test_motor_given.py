@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from app.errors import MotorInventedError, MotorUnknownError, UsageError
+from app.errors import MotorUnknownError, UsageError
 from app.model.address import Address, parse_address
 from app.model.motor import Draft, Motor
 from app.model.restore.plan import Treatment, Why
@@ -96,5 +96,5 @@ async def test_only_what_names_a_motor_of_the_database_and_its_drive_is_taken(be
     for slug in (PMM, "wtg-07/blade-9/pmc"):
         with pytest.raises(UsageError):
             await given_motor(motors, connection, f"motor:{motor.id}@1:{slug}", "Anna")
-    with pytest.raises(MotorInventedError):  # nobody has read yet that it is a twin
-        await given_motor(motors, connection, f"motor:{examples()[0].id}@1:{PMC}", "Anna")
+    example = await given_motor(motors, connection, f"motor:{examples()[0].id}@1:{PMC}", "Anna")
+    assert example.parameters.identity.device_name == "HUBSIDE TWIN PMC", "into a twin even an invented one goes"
