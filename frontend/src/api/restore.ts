@@ -17,6 +17,8 @@ export type RestoreHead = Schemas["RestoreHead"];
 export type RestoreDoc = Schemas["RestoreDoc"];
 export type RestoreValue = Schemas["RestoreValue"];
 export type RestoreStep = Schemas["RestoreStepDoc"];
+/** One occasion on which a set was taken. */
+export type SetRecord = Schemas["SetRecordDoc"];
 export type Way = RestoreDoc["can"][number];
 
 const RUN_POLL_MS = 400;

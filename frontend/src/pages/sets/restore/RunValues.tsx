@@ -38,6 +38,7 @@ interface ValueLine {
 const SIGNS = {
   [Stage.Equal]: { Icon: IconEqual, tone: "dim" },
   [Stage.Waiting]: { Icon: IconHourglass, tone: "dim" },
+  [Stage.Untouched]: { Icon: IconEqual, tone: "dim" },
   [Stage.Sent]: { Icon: IconArrowRight, tone: "" },
   [Stage.ReadBack]: { Icon: IconCheck, tone: "" },
   [Stage.Saved]: { Icon: IconDeviceFloppy, tone: "" },

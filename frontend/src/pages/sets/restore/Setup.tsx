@@ -1,31 +1,63 @@
-import { Button, Select } from "@mantine/core";
-import { IconArrowLeft, IconBooks } from "@tabler/icons-react";
+import { Button, CloseButton, Select } from "@mantine/core";
+import { IconBooks } from "@tabler/icons-react";
 import { useQuery } from "@tanstack/react-query";
+import { setsQuery } from "../../../api/files";
 import { turbineQuery } from "../../../api/queries";
+import type { SetRecord } from "../../../api/restore";
 import { usePageSearch } from "../../../frame/search";
-import { useTexts } from "../../../texts/texts";
+import { type Translate, useTexts } from "../../../texts/texts";
 import { stationName } from "../../../ui/devices";
+import { dateAndTime } from "../../../ui/format";
+import { assign, type Assigned, exchange, others } from "./assign";
 import { setsIn } from "./order";
 import classes from "./Restore.module.css";
 
-/** Which station is to have which sets. */
+const NONE: SetRecord[] = [];
+
+/** Which station is to have which sets: one for each of its devices, or none. */
 export function Setup() {
   const t = useTexts();
   const [search, update] = usePageSearch();
   const stations = useQuery(turbineQuery).data?.stations ?? [];
+  const records = useQuery(setsQuery).data?.records ?? NONE;
   const sets = setsIn(search.sets);
+  const station = stations.find((one) => one.slug === search.station);
+  const onSets = (next: string[]) =>
+    update({ sets: next.length === 0 ? undefined : next.join(","), select: undefined, rows: undefined });
   return (
     <div className={classes.setup}>
       <Select
         label={t("page.restoring.station")}
         placeholder={t("page.restoring.choose_station")}
         data={stations.map((one) => ({ value: one.slug, label: stationName(one, t) }))}
-        value={search.station ?? null}
+        value={station?.slug ?? null}
         allowDeselect={false}
+        w={170}
         onChange={(slug) => update({ station: slug ?? undefined, select: undefined })}
         data-testid="restore-station"
       />
-      {sets.length === 0 ? (
+      {station &&
+        assign(station.devices, records, sets).map((one) => (
+          <SetOf
+            key={one.device.slug}
+            assigned={one}
+            onChange={(to) => onSets(exchange(sets, one.record?.id ?? null, to))}
+          />
+        ))}
+      {others(records, sets).map((key) => (
+        <span key={key} className={classes.other}>
+          {key}
+          <CloseButton
+            aria-label={t("page.restoring.take_out", { set: key })}
+            onClick={() => onSets(sets.filter((one) => one !== key))}
+          />
+        </span>
+      ))}
+      {sets.length > 0 ? (
+        <Button variant="subtle" onClick={() => onSets([])} data-testid="restore-leave">
+          {t("page.restoring.to_all")}
+        </Button>
+      ) : (
         <Button
           variant="default"
           leftSection={<IconBooks size={17} aria-hidden />}
@@ -33,16 +65,46 @@ export function Setup() {
         >
           {t("page.restoring.to_library")}
         </Button>
-      ) : (
-        <Button
-          variant="subtle"
-          leftSection={<IconArrowLeft size={17} aria-hidden />}
-          onClick={() => update({ sets: undefined, select: undefined, rows: undefined })}
-          data-testid="restore-leave"
-        >
-          {t("page.restoring.to_all")}
-        </Button>
       )}
     </div>
   );
+}
+
+interface SetOfProps {
+  assigned: Assigned;
+  onChange: (id: string | null) => void;
+}
+
+function SetOf({ assigned: { device, record, choices }, onChange }: SetOfProps) {
+  const t = useTexts();
+  const own = choices.filter((one) => one.origin.device === device.slug);
+  const items = (list: SetRecord[]) => list.map((one) => ({ value: one.id, label: nameOf(one, t) }));
+  const groups = [
+    { group: t("page.restoring.own_sets"), items: items(own) },
+    { group: t("page.restoring.other_sets"), items: items(choices.slice(own.length)) },
+  ];
+  return (
+    <Select
+      className={classes.chosen ?? ""}
+      label={t("page.restoring.change", { device: device.name })}
+      placeholder={t(choices.length === 0 ? "page.restoring.no_sets" : "page.restoring.leave")}
+      data={groups.filter((one) => one.items.length > 0)}
+      value={record?.id ?? null}
+      searchable
+      clearable
+      limit={MOST_SHOWN}
+      clearButtonProps={{ "aria-label": t("page.restoring.leave") }}
+      onChange={onChange}
+      data-testid={`restore-set-${device.slug}`}
+    />
+  );
+}
+
+const MOST_SHOWN = 200;
+
+/** `golden · 2026-11-22 04:31 · wtg-07 / blade-1 / pmc · before the gearbox`. */
+function nameOf(record: SetRecord, t: Translate): string {
+  const tags = record.tags.map((one) => t(`page.restoring.tag.${one.tag}`)).join(", ");
+  const place = record.origin.device.split("/").join(" / ");
+  return [tags, dateAndTime(record.t_ns / 1e6), place, record.origin.reason].filter(Boolean).join(" · ");
 }

@@ -32,10 +32,11 @@ export function phasesOf(doc: RestoreDoc): { phase: Phase; standing: Standing }[
   }));
 }
 
-/** How far one value is. Back: its old value was put back. */
+/** How far one value is. Back: its old value was put back. Untouched: the restore ended before its turn. */
 export enum Stage {
   Equal = "equal",
   Waiting = "waiting",
+  Untouched = "untouched",
   Sent = "sent",
   ReadBack = "read-back",
   Saved = "saved",
@@ -49,6 +50,8 @@ export enum Stage {
 export interface Kept {
   saved: ReadonlySet<string>;
   proven: ReadonlySet<string>;
+  /** Nothing more is written. */
+  ended: boolean;
 }
 
 export function keptOf(doc: RestoreDoc): Kept {
@@ -61,15 +64,15 @@ export function keptOf(doc: RestoreDoc): Kept {
   const restarted = devices("restart");
   const read = devices("prove");
   const proven = new Set([...saved].filter((slug) => restarted.has(slug) && read.has(slug)));
-  return { saved, proven };
+  return { saved, proven, ended: doc.end !== null };
 }
 
-export function stageOf(value: RestoreValue, { saved, proven }: Kept): Stage {
+export function stageOf(value: RestoreValue, { saved, proven, ended }: Kept): Stage {
   if (value.state === "failed") return Stage.Failed;
   if (value.state === "unknown") return Stage.Unknown;
   if (value.state === "intended") return Stage.Sent;
   if (value.state === "done" && value.written === "before") return Stage.Back;
-  if (value.state === "waiting") return Stage.Waiting;
+  if (value.state === "waiting") return ended ? Stage.Untouched : Stage.Waiting;
   if (proven.has(value.device)) return Stage.Proven;
   if (saved.has(value.device)) return Stage.Saved;
   return value.state === "equal" ? Stage.Equal : Stage.ReadBack;
