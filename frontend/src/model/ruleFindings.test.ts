@@ -96,6 +96,8 @@ describe("a finding in words", () => {
   it("names the values, or what is missing", () => {
     expect(lineOfFinding(LADDER, t)).toBe("6510:04 = 410 V");
     expect(lineOfFinding(UNJUDGED, t)).toBe("Not checked: 30FC:01");
+    const german = translator({ "rule.oat.dc_link_ladder.broken": "{lower_v} V" }, "de");
+    expect(lineOfFinding({ ...LADDER, details: { lower_v: 0.5 } }, german)).toBe("0,5 V");
   });
 
   it("has the rule behind it, and says where a value was never set", () => {

@@ -1,4 +1,5 @@
 /** Findings of the server's rules, as the page looks at them: by place, by what is being edited, in words. */
+import type { Language } from "../api/types";
 import type { PendingValues, RuleDoc, RuleFinding, StationFindings } from "../api/rules";
 import type { Translate } from "../texts/texts";
 import { type Change, keyOf } from "./staged";
@@ -59,8 +60,14 @@ export const touching = (findings: readonly RuleFinding[], pending: PendingValue
   );
 
 /** What is wrong, or not known, in one line. */
-export const lineOfFinding = (finding: RuleFinding, t: Translate): string =>
-  t(isBroken(finding) ? `rule.${finding.rule}.broken` : "rule.not_checked", finding.details);
+export function lineOfFinding(finding: RuleFinding, t: Translate): string {
+  if (!isBroken(finding)) return t("rule.not_checked", finding.details);
+  const details = Object.entries(finding.details).map(([name, one]) => [name, spoken(one, t.language)]);
+  return t(`rule.${finding.rule}.broken`, Object.fromEntries(details));
+}
+
+const spoken = (detail: number | string, language: Language): string =>
+  typeof detail === "number" && language === "de" ? String(detail).replace(".", ",") : String(detail);
 
 /** The rule behind a finding: what should be, why, and whether the value was ever set. */
 export function reasonOfFinding({ rule, details }: RuleFinding, t: Translate): string {
