@@ -31,6 +31,7 @@ from app.service.office.office import Office
 from app.service.restore.assign import assign
 from app.service.restore.desk import Desk
 from app.service.restore.details import plain
+from app.service.restore.motor_given import given_motor, is_motor
 from app.service.restore.order import Given, Order
 from app.service.restore.prepare import Prepared
 from app.service.restore.survey import targets_of
@@ -50,6 +51,16 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     add_connection(parser, required=False)
     parser.add_argument("set", nargs="*", help="set files, or ids or hashes of sets in the library; one a device")
     parser.add_argument("--station", help="TURBINE/STATION; that of the sets where not given")
+    add_terms(parser)
+    way = parser.add_mutually_exclusive_group()
+    way.add_argument("--resume", nargs="?", const="", metavar="ID", help="go on with one that is incomplete")
+    way.add_argument("--roll-back", nargs="?", const="", metavar="ID", help="take back one that is incomplete")
+    way.add_argument("--list", action="store_true", help="restores of the data folder, newest first")
+    parser.set_defaults(run=restore)
+
+
+def add_terms(parser: argparse.ArgumentParser) -> None:
+    """What a person says of a restore besides the sets."""
     parser.add_argument("--plan", action="store_true", help="show what would be done, and do nothing")
     parser.add_argument("--select", metavar="ADDRESS,…", help="these objects only: 6065, pmm/3110:01")
     parser.add_argument("--restart", action="store_true", help="agree to restart the devices, which proves the result")
@@ -66,14 +77,10 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser.add_argument(
         "--accept", action="append", default=[], metavar="RULE", help="with --expert: this rule may stay broken"
     )
-    way = parser.add_mutually_exclusive_group()
-    way.add_argument("--resume", nargs="?", const="", metavar="ID", help="go on with one that is incomplete")
-    way.add_argument("--roll-back", nargs="?", const="", metavar="ID", help="take back one that is incomplete")
-    way.add_argument("--list", action="store_true", help="restores of the data folder, newest first")
-    parser.set_defaults(run=_run)
 
 
-def _run(arguments: argparse.Namespace, output: Output) -> int:
+def restore(arguments: argparse.Namespace, output: Output) -> int:
+    """Do what the arguments say; gives the exit code."""
     _check(arguments)
     if arguments.list:
         return run_command(_list(arguments, output))
@@ -140,7 +147,7 @@ async def _desk(arguments: argparse.Namespace, output: Output) -> AsyncIterator[
             office = Office(store, connection.journal, connection.stamper, person)
             for entry in connection.journal.latest():
                 office.audit.take(entry)
-            desk = Desk(office, connection.journal, connection.stamper)
+            desk = Desk(office, connection.journal, connection.stamper, data=arguments.settings.data)
             connection.gate.blocks = desk.blocks
             try:
                 yield desk, connection, office
@@ -188,7 +195,7 @@ def _open_one(desk: Desk, connection: Connection, named: str) -> str:
 
 
 async def _order(arguments: argparse.Namespace, connection: Connection, office: Office) -> Order:
-    sets = [await _given(office, name) for name in arguments.set]
+    sets = [await _given(arguments, connection, office, name) for name in arguments.set]
     station = _station(arguments, connection, sets)
     given, homeless = assign(targets_of(connection, station), sets)
     return Order(
@@ -207,8 +214,10 @@ async def _order(arguments: argparse.Namespace, connection: Connection, office: 
     )
 
 
-async def _given(office: Office, name: str) -> Given:
-    """A set file, else a set of the library. Raises SetFileError, SetUnknownError."""
+async def _given(arguments: argparse.Namespace, connection: Connection, office: Office, name: str) -> Given:
+    """A motor, a set file, else a set of the library. Raises SetFileError, SetUnknownError, MotorUnknownError."""
+    if is_motor(name):
+        return await given_motor(office.motors, connection, name, arguments.settings.person)
     file = _file(name)
     if file is not None:
         return Given(file)

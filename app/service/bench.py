@@ -65,7 +65,7 @@ class Bench:
         self.stamper = stamper or Stamper(wall_ns(), monotonic_ns)
         self.journal = journal or Journal(self.stamper, options.person)
         self.office = Office(store or Store.in_memory(), self.journal, self.stamper, options.person)
-        self.restores = Desk(self.office, self.journal, self.stamper)
+        self.restores = Desk(self.office, self.journal, self.stamper, data=options.data)
         self.site_editor = SiteEditor(sites)
         self.polling = Polling(self.office.store)
         self.connection: Connection | None = None

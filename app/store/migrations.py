@@ -131,6 +131,17 @@ STEPS: Final[tuple[tuple[str, ...], ...]] = (
             seen TEXT NOT NULL
         ) STRICT""",
     ),
+    (
+        """CREATE TABLE restore_records (
+            seq INTEGER PRIMARY KEY NOT NULL, restore_id TEXT NOT NULL REFERENCES restores (id), t_ns INTEGER NOT NULL,
+            text TEXT NOT NULL, seal TEXT NOT NULL
+        ) STRICT""",
+        *(
+            f"""CREATE TRIGGER restore_records_never_{doing.lower()} BEFORE {doing} ON restore_records
+            BEGIN SELECT RAISE(ABORT, 'rows of restore_records are kept as they are'); END"""
+            for doing in ("UPDATE", "DELETE")
+        ),
+    ),
 )
 SCHEMA: Final = len(STEPS)
 """The version that this program writes."""

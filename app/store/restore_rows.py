@@ -17,7 +17,7 @@ from typing import Any, Final
 from sqlalchemy import Connection, insert, select, update
 
 from app.errors import StoreError
-from app.store.schema import restore_steps, restore_values, restores
+from app.store.schema import restore_records, restore_steps, restore_values, restores
 
 
 class RestoreState(Enum):
@@ -165,6 +165,19 @@ def steps_of(connection: Connection, restore_id: str) -> list[StepRow]:
     table = restore_steps
     query = select(table).where(table.c.restore_id == restore_id).order_by(table.c.n)
     return [_step(dict(row._mapping)) for row in connection.execute(query)]
+
+
+def add_record(connection: Connection, restore_id: str, t_ns: int, text: str, seal: str) -> None:
+    """The sealed record of a restore at its end."""
+    connection.execute(insert(restore_records), {"restore_id": restore_id, "t_ns": t_ns, "text": text, "seal": seal})
+
+
+def get_record(connection: Connection, restore_id: str) -> tuple[str, str] | None:
+    """Text and seal of the latest record of a restore."""
+    table = restore_records
+    query = select(table).where(table.c.restore_id == restore_id).order_by(table.c.seq.desc()).limit(1)
+    found = connection.execute(query).first()
+    return None if found is None else (found.text, found.seal)
 
 
 def peek_open(path: Path) -> list[RestoreRow]:

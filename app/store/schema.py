@@ -174,6 +174,17 @@ restore_steps = Table(
 )
 """Each row is committed before its step is carried out."""
 
+restore_records = Table(
+    "restore_records",
+    metadata,
+    Column("seq", Integer, primary_key=True),
+    Column("restore_id", Text, ForeignKey("restores.id"), nullable=False),
+    Column("t_ns", Integer, nullable=False),
+    Column("text", Text, nullable=False),
+    Column("seal", Text, nullable=False),
+)
+"""``text`` is the canonical JSON of a record; one at each end of a restore, the last one counts."""
+
 set_layouts = Table(
     "set_layouts",
     metadata,

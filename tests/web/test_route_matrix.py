@@ -108,6 +108,7 @@ ROUTES: Final[dict[tuple[str, str], Role]] = {
     ("POST", "/api/live/restores/{restore_id}/confirm"): TECHNICIAN,
     ("POST", "/api/live/restores/{restore_id}/roll-back"): TECHNICIAN,
     ("POST", "/api/live/restores/{restore_id}/resume"): TECHNICIAN,
+    ("GET", "/api/records/{file}"): VIEWER,
     # faults in our own twins
     ("GET", "/api/instructor"): VIEWER,
     ("GET", "/api/instructor/catalogue"): VIEWER,

@@ -5,9 +5,11 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+import logging
 import time
 from collections.abc import Callable, Coroutine, Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any, Final
 
 from app.errors import (
@@ -17,27 +19,34 @@ from app.errors import (
     RestoreRefusedError,
     RestoreStateError,
     RestoreUnknownError,
+    SigningKeyError,
     StoreError,
     UsageError,
 )
+from app.model.description import Description
 from app.model.set_record import SetRecord, Source
 from app.service.connection import Connection
 from app.service.devices import Target
 from app.service.gate import OPEN, Blocks
 from app.service.journal import Journal, Kind
 from app.service.office.office import Office
+from app.service.records.files import SealedRecord, seal_record
+from app.service.records.signing import SigningKey
 from app.service.restore import details as detail
 from app.service.restore.blocking import block_of
 from app.service.restore.log import Kept, RestoreLog, event, load, new_row, value_rows
 from app.service.restore.motor_given import note_motors
 from app.service.restore.order import Broken, Cause, Order, Timing
 from app.service.restore.prepare import Prepared, prepare
+from app.service.restore.record import RecordOf
 from app.service.restore.steps import Hands
 from app.service.restore.survey import Progress, Survey, targets_of
 from app.service.restore.transaction import End, Terms, Transaction
 from app.store import restore_rows as rows
 from app.store.restore_rows import RestoreRow, RestoreState
 from app.store.uuid7 import Uuid7
+
+log = logging.getLogger(__name__)
 
 REASON_BEFORE: Final = "before a restore"
 REASON_AFTER: Final = "after a restore"
@@ -56,7 +65,8 @@ class Running:
 class Desk:
     """The restores of one store. Belongs to the event loop; one restore is worked on at a time.
 
-    ``stamp`` gives t_ns; ``blocks`` is what the gates of connections look at. Raises StoreError.
+    ``stamp`` gives t_ns; ``blocks`` is what the gates of connections look at. ``data``: folder of the key that seals
+    records; None makes none. Raises StoreError.
     """
 
     def __init__(
@@ -66,13 +76,16 @@ class Desk:
         stamp: Callable[[], int],
         timing: Timing | None = None,
         monotonic: Callable[[], float] = time.monotonic,
+        data: Path | None = None,
     ) -> None:
         self.blocks = Blocks()
         self.running: Running | None = None
+        self._endings: set[asyncio.Future[None]] = set()
         self._office = office
         self._store = office.store
         self._journal = journal
         self._stamp = stamp
+        self._data = data
         self._timing = timing or Timing()
         self._monotonic = monotonic
         self._new_id = Uuid7(stamp)
@@ -227,7 +240,10 @@ class Desk:
             end = await way
             return end
         finally:
-            await asyncio.shield(self._ended(row, transaction, end, person))
+            ending = asyncio.ensure_future(self._ended(row, transaction, end, person))
+            self._endings.add(ending)
+            ending.add_done_callback(self._endings.discard)
+            await asyncio.shield(ending)
 
     async def _ended(self, row: RestoreRow, transaction: Transaction, end: End, person: str) -> None:
         """The gate opens only where the station holds the old values or the new ones."""
@@ -244,8 +260,9 @@ class Desk:
         if end is not End.NEW:
             details["cause_key"] = cause.text_key
         self._journal.by(person).note(_KIND_OF[end], None, **details)
-        if transaction.found is not None and end is not End.INCOMPLETE:
-            await self._keep(transaction.found, REASON_AFTER, person, Source.BACKUP)
+        found = transaction.found if end is not End.INCOMPLETE else None
+        after = [] if found is None else await self._keep(found, REASON_AFTER, person, Source.BACKUP)
+        await self._seal(row.id, transaction.descriptions, found, after)
         if end is End.NEW:
             with contextlib.suppress(StoreError, MotorUnknownError):
                 await note_motors(self._office.motors, json.loads(row.details)["devices"], person)
@@ -259,6 +276,7 @@ class Desk:
         running = self.running
         if running is not None and running.id == restore_id:
             return await asyncio.shield(running.task)
+        await self._settle()
         state = (await self.get(restore_id)).row.state
         return {RestoreState.DONE: End.NEW, RestoreState.ROLLED_BACK: End.OLD}.get(state, End.INCOMPLETE)
 
@@ -268,6 +286,36 @@ class Desk:
         if running is not None:
             running.task.cancel()
             await asyncio.wait([running.task])
+        await self._settle()
+
+    async def _settle(self) -> None:
+        """Until all that is kept of restores that have ended is on the disk."""
+        await asyncio.gather(*self._endings, return_exceptions=True)
+
+    async def record(self, restore_id: str) -> SealedRecord | None:
+        """The sealed record of a restore that has come to an end, be it incomplete. Raises StoreError."""
+        found = await self._store.run(lambda connection: rows.get_record(connection, restore_id))
+        return None if found is None else SealedRecord(*found)
+
+    def key(self) -> SigningKey | None:
+        """The key that seals; None where there is no data folder. Waits for the disk. Raises SigningKeyError."""
+        return None if self._data is None else SigningKey.of(self._data)
+
+    async def _seal(
+        self, restore_id: str, descriptions: Mapping[str, Description], found: Survey | None, after: list[SetRecord]
+    ) -> None:
+        """Make, seal and keep the record. What fails is told in the log: the restore itself has ended well or not."""
+        if self._data is None:
+            return
+        ids = {one.origin.device: one.id for one in after}
+        try:
+            kept = await self.get(restore_id)
+            record = RecordOf(kept, descriptions, {} if found is None else found.sets, ids).make()
+            key = await asyncio.to_thread(SigningKey.of, self._data)
+            one, t_ns = seal_record(record, key), self._stamp()
+            await self._store.run(lambda to: rows.add_record(to, restore_id, t_ns, one.text, one.seal))
+        except (StoreError, SigningKeyError):
+            log.exception("the record of restore %s could not be kept", restore_id)
 
     # -- the gate -----------------------------------------------------------------------
 

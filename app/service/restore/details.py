@@ -8,6 +8,7 @@ from typing import Any
 from app.model.datatypes import Raw
 from app.model.restore.plan import Plan, StepKind, Treatment
 from app.model.rules.rule import Finding
+from app.model.sets import ParameterSet
 from app.service.connection import Connection
 from app.service.gate import adapter_of
 from app.service.restore.prepare import Prepared
@@ -28,8 +29,8 @@ def details_of(connection: Connection, prepared: Prepared, before: Mapping[str, 
                 "node": target.node,
                 "description": [target.description.id, target.description.version],
                 "identity": found.identity.as_json(),
-                "before": {"hash": found.hash, "record": before.get(slug, "")},
-                "set": None if given is None else {"hash": given.parameters.hash, "record": given.record},
+                "before": reference(found, before.get(slug, "")),
+                "set": None if given is None else reference(given.parameters, given.record),
                 "same_unit": prepared.same_unit.get(slug),
             }
         )
@@ -47,6 +48,20 @@ def details_of(connection: Connection, prepared: Prepared, before: Mapping[str, 
         "skipped": _skipped(plan),
         "writes": [[row.place.slug, str(row.place.address)] for row in plan.rows if row.treatment is Treatment.WRITE],
         "findings": [_finding(one) for one in plan.findings],
+    }
+
+
+def reference(parameters: ParameterSet, record: str) -> dict[str, str]:
+    """Which set that is, and where it comes from."""
+    origin = parameters.origin
+    return {
+        "hash": parameters.hash,
+        "record": record,
+        "device": origin.device,
+        "time": origin.time,
+        "person": origin.person,
+        "reason": origin.reason,
+        "work_order": origin.work_order,
     }
 
 

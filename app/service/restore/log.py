@@ -18,7 +18,6 @@ from app.store import restore_rows as rows
 from app.store.restore_rows import Direction, RestoreRow, RestoreState, StepRow, StepState, ValueRow
 from app.store.store import Store
 
-
 BEGUN: Final = f"journal.{Kind.RESTORE_BEGUN.value}"
 
 

@@ -39,11 +39,16 @@ from app.service.restore.survey import (
     read_whole,
 )
 from app.service.save import restart, save
+from app.service.stop import CONTROLWORD
 from app.service.write import write_raw
 from app.store.restore_rows import Direction, StepState
 
 T = TypeVar("T")
 DEVICE_TYPE: Final = Address(0x1000)
+SHUTDOWN: Final = 0x0106
+"""Controlword (manual table 52)."""
+_ENABLE_OPERATION: Final = 1 << 3
+_FEATHER: Final = 1 << 11
 LOOK_S: Final = 0.05
 """How often is looked whether a device is ready, an axis stands, or a person has decided."""
 
@@ -166,6 +171,8 @@ class Hands:
         assert step.place is not None and step.raw is not None  # a step that writes has both
         place, target = step.place, self.targets[step.device]
         await self.guard()
+        if step.until is not None:
+            await self._let_go(target, direction)
         await self._log.intend(direction, step.kind, step.device, place, step.raw)
         try:
             done = await whole(
@@ -188,6 +195,29 @@ class Hands:
         read = None if done.read is None else raw_text(done.read)
         self._log.ended(StepState.DONE, read=read, how=done.how.value)
         self.look_for_restarts()
+
+    async def _let_go(self, target: Target, direction: Direction) -> None:
+        """Have the controlword ask for nothing: the mode of operation changes only then (manual 5.9.1).
+
+        STOP leaves the bit set that enables operation, although the axis is off. Shutdown keeps it off. A FEATHER that
+        stands in it is for a person to take back.
+        """
+        word = await self._integer(target, CONTROLWORD)
+        if word is None or not word & _ENABLE_OPERATION:
+            return
+        if word & _FEATHER:
+            raise Broken(Cause.DRIVE_ENABLED, target.slug)
+        place = Place(target.slug, CONTROLWORD)
+        await self._log.intend(direction, StepKind.AUXILIARY, target.slug, place, SHUTDOWN)
+        try:
+            driver = self.connection.driver(target)
+            done = await whole(
+                write_raw(driver, target, CONTROLWORD, SHUTDOWN, self._journal, allow=Allow.MOTION, expected=word)
+            )
+        except HubsideError as error:
+            self._log.ended(_state_after(error), error)
+            raise Broken(cause_of(error), target.slug, error) from error
+        self._log.ended(StepState.DONE, how=done.how.value)
 
     def _allow(self, target: Target, address: Address) -> Allow:
         factory = self._expert and target.entry(address).restore is RestoreClass.FACTORY

@@ -15,6 +15,7 @@ from typing import Final
 
 from app.errors import HubsideError
 from app.model.datatypes import Raw
+from app.model.description import Description
 from app.model.restore.plan import Plan, Step, StepKind
 from app.model.restore.planner import make_plan
 from app.model.restore.wanted import PlanOptions, Wanted
@@ -79,6 +80,11 @@ class Transaction:
         self._deadline: float | None = None
 
     # -- for people ------------------------------------------------------------------
+
+    @property
+    def descriptions(self) -> Mapping[str, Description]:
+        """Those of its devices, by slug."""
+        return {slug: target.description for slug, target in self._hands.targets.items()}
 
     @property
     def state(self) -> RestoreState:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+import asyncio
+from typing import Annotated, Final, Literal
 
-from fastapi import APIRouter, Query
+from fastapi import APIRouter, Query, Response
 
 from app.model.address import parse_address
 from app.model.roles import Role, SignedIn
 from app.model.station import Place
 from app.service.bench import Bench
 from app.service.connection import Connection
+from app.service.records.files import html_file, pdf_file
 from app.service.restore.assign import assign
 from app.service.restore.motor_given import given_motor, is_motor
 from app.service.restore.order import Given, Order
@@ -19,8 +21,11 @@ from app.web.deps import BenchOf, ConnectionOf, PersonOf, needs
 from app.web.models import Nothing
 from app.web.models.restore import RestoreDoc, RestoreHead, RestorePlanDoc, RestorePlanRequest, RestoreRequest
 from app.web.models.restore_docs import descriptions_of, head_doc, plan_doc, restore_doc
+from app.web.problem import NotFoundError
 
 router = APIRouter()
+
+_MEDIA: Final = {"html": "text/html; charset=utf-8", "pdf": "application/pdf", "json": "application/json"}
 
 
 @router.post("/live/restore/plan", dependencies=[needs(Role.TECHNICIAN)])
@@ -77,6 +82,23 @@ async def resume_restore(bench: BenchOf, person: PersonOf, restore_id: str, _req
     """On to the new values, from whatever is there."""
     await bench.restores.resume(bench.connection, restore_id, person.person)
     return await _doc(bench, restore_id)
+
+
+@router.get("/records/{file}", response_class=Response)
+async def record_file(bench: BenchOf, file: str, locale: Annotated[Literal["en", "de"], Query()] = "en") -> Response:
+    """The signed record of a restore: ``<id>.html``, ``<id>.pdf`` or ``<id>.json``."""
+    restore_id, _, form = file.rpartition(".")
+    sealed = await bench.restores.record(restore_id) if form in _MEDIA else None
+    key = None if sealed is None else await asyncio.to_thread(bench.restores.key)
+    if sealed is None or key is None:
+        raise NotFoundError(what=file)
+    if form == "json":
+        content = sealed.json.encode()
+    else:
+        make = html_file if form == "html" else pdf_file
+        content = await asyncio.to_thread(make, sealed, locale, key)
+    name = f'attachment; filename="restore-{restore_id}.{form}"'
+    return Response(content, media_type=_MEDIA[form], headers={"Content-Disposition": name})
 
 
 async def _order(bench: Bench, connection: Connection, person: SignedIn, request: RestorePlanRequest) -> Order:

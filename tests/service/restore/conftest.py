@@ -109,7 +109,7 @@ class Bench:
 
     def another_desk(self, timing: Timing | None = None) -> Desk:
         """A desk as the next run of the tool makes it."""
-        desk = Desk(self.office, self.connection.journal, self.connection.stamper, timing or QUICK)
+        desk = Desk(self.office, self.connection.journal, self.connection.stamper, timing or QUICK, data=self.data)
         self.connection.gate.blocks = desk.blocks
         return desk
 
@@ -144,7 +144,7 @@ def served() -> Iterator[Served]:
 async def bench(connection: Connection, served: Served, tmp_path: Path) -> AsyncIterator[Bench]:
     """A desk with a store on the disk."""
     office = Office(Store.open(tmp_path / "data"), connection.journal, connection.stamper, "tester")
-    desk = Desk(office, connection.journal, connection.stamper, QUICK)
+    desk = Desk(office, connection.journal, connection.stamper, QUICK, data=tmp_path / "data")
     connection.gate.blocks = desk.blocks
     try:
         yield Bench(desk, connection, office, served, tmp_path / "data")
