@@ -1,8 +1,8 @@
 /** Comparisons of parameter sets: columns side by side, and one golden set against the fleet. */
 import { keepPreviousData, queryOptions } from "@tanstack/react-query";
-import { send, sendForFile } from "./client";
+import { get, send, sendForFile } from "./client";
 import type { components } from "./generated";
-import type { Raw } from "./types";
+import type { DescriptionDoc, Raw } from "./types";
 
 type Schemas = components["schemas"];
 
@@ -40,3 +40,31 @@ export const exportComparison = (
   columns: readonly string[],
   pending: Pending,
 ): Promise<Blob> => sendForFile(`/api/compare/export?format=${format}`, { columns, pending });
+
+export type SetRecord = Schemas["SetRecordDoc"];
+
+export const MOST_RECORDS = 2000;
+const FRESH_MS = 5000;
+
+/** Sets of the library, latest first; of one kind of device, or of all where it is null. */
+export const recordsQuery = (kind: string | null, limit: number = MOST_RECORDS) =>
+  queryOptions({
+    queryKey: ["sets", "records", kind, limit],
+    queryFn: async ({ signal }) => {
+      const of = kind === null ? "" : `&description_id=${encodeURIComponent(kind)}`;
+      return (await get<Schemas["SetList"]>(`/api/sets?limit=${limit}${of}`, signal)).records;
+    },
+    staleTime: FRESH_MS,
+  });
+
+/** What describes a kind of device, connected or not. */
+export const knownDescriptionQuery = (id: string) =>
+  queryOptions({
+    queryKey: ["known-description", id],
+    queryFn: ({ signal }) => get<DescriptionDoc>(`/api/descriptions/${encodeURIComponent(id)}`, signal),
+    enabled: id !== "",
+  });
+
+/** Takes a file into the library: `data` is base64; `device` and `kind` are for files that do not tell whose they are. */
+export const importSet = (name: string, data: string, device: string | null, kind: string | null) =>
+  send<Schemas["SetTaken"]>("POST", "/api/sets/import", { name, data, device, description_id: kind });

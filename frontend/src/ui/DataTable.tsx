@@ -29,6 +29,8 @@ interface Props<Row> {
   name?: string;
   /** Low rows, for much that is only looked at. */
   dense?: boolean;
+  /** Heads of up to three lines, for many narrow columns. */
+  tallHead?: boolean;
   /** Its values change all the time: the order is held while somebody is among the rows. */
   live?: boolean;
   toneOf?: (row: Row) => string;
@@ -36,11 +38,13 @@ interface Props<Row> {
 
 const NO_COLUMNS: readonly string[] = [];
 const GAP_PX = 12;
+const HEAD_PX = 41;
+const TALL_HEAD_PX = 63;
 
 /** A table with filter, order, choice of columns, copy, export and keyboard; only the rows in view are drawn. */
 export function DataTable<Row>(props: Props<Row>) {
   const { label, rows, columns, idOf, fileName, empty, tools } = props;
-  const { name = "row", dense = false, live = false, hiddenFirst = NO_COLUMNS } = props;
+  const { name = "row", dense = false, live = false, tallHead = false, hiddenFirst = NO_COLUMNS } = props;
   const t = useTexts();
   const [search, update] = usePageSearch();
   const [typed, setTyped] = useTyped(search.find ?? "", (text) => update({ find: text }));
@@ -66,7 +70,13 @@ export function DataTable<Row>(props: Props<Row>) {
     event.preventDefault();
   };
   return (
-    <section ref={section} className={classes.table} aria-label={label} data-dense={dense}>
+    <section
+      ref={section}
+      className={classes.table}
+      aria-label={label}
+      data-dense={dense}
+      data-tall={tallHead}
+    >
       <div className={classes.tools} role="toolbar" aria-label={t("page.table.tools")}>
         <TextInput
           className={classes.filter ?? ""}
@@ -98,6 +108,7 @@ export function DataTable<Row>(props: Props<Row>) {
         columns={visible}
         look={look}
         dense={dense}
+        headPx={tallHead ? TALL_HEAD_PX : HEAD_PX}
         idOf={idOf}
         toneOf={props.toneOf}
         onOpen={props.onOpen}

@@ -5,7 +5,6 @@ import classes from "./DataTable.module.css";
 
 const ROW_PX = 40;
 const DENSE_ROW_PX = 30;
-const HEAD_PX = 41;
 const OVERSCAN = 8;
 const PAGE_ROWS = 10;
 
@@ -16,6 +15,7 @@ interface Props<Row> {
   columns: readonly TableColumn<Row>[];
   look: { gridTemplateColumns: string; minWidth: number };
   dense: boolean;
+  headPx: number;
   idOf: (row: Row) => string;
   toneOf: ((row: Row) => string) | undefined;
   onOpen: ((row: Row) => void) | undefined;
@@ -27,7 +27,7 @@ interface Props<Row> {
 
 /** Head and rows in one scroller. The row that the keyboard is at is known by its id: it is kept when rows move. */
 export function TableBody<Row>(props: Props<Row>) {
-  const { rows, columns, idOf, onOpen, selected, look, name, hold } = props;
+  const { rows, columns, idOf, onOpen, selected, look, name, hold, headPx } = props;
   const rowPx = props.dense ? DENSE_ROW_PX : ROW_PX;
   const scroller = useRef<HTMLDivElement>(null);
   const [at, setAt] = useState<string | null>(null);
@@ -40,8 +40,8 @@ export function TableBody<Row>(props: Props<Row>) {
     getScrollElement: () => scroller.current,
     estimateSize: () => rowPx,
     overscan: OVERSCAN,
-    scrollMargin: HEAD_PX,
-    scrollPaddingStart: HEAD_PX,
+    scrollMargin: headPx,
+    scrollPaddingStart: headPx,
     // The row with the focus stays in the document wherever it is scrolled to.
     rangeExtractor: (range) =>
       [...new Set([...defaultRangeExtractor(range), Math.min(current, range.count - 1)])].sort(
@@ -106,7 +106,7 @@ export function TableBody<Row>(props: Props<Row>) {
               className={classes.row}
               style={{
                 gridTemplateColumns: look.gridTemplateColumns,
-                transform: `translateY(${start - HEAD_PX}px)`,
+                transform: `translateY(${start - headPx}px)`,
                 height: rowPx,
               }}
               onFocus={() => setAt(id)}

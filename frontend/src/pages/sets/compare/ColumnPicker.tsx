@@ -1,14 +1,16 @@
 import { Button, Combobox, useCombobox } from "@mantine/core";
-import { IconCheck, IconPlus } from "@tabler/icons-react";
-import { useState } from "react";
+import { IconCheck, IconFileUpload, IconPlus } from "@tabler/icons-react";
+import { useRef, useState } from "react";
 import { MOST_COLUMNS } from "../../../api/compare";
 import { useTexts } from "../../../texts/texts";
 import { foundChoices, grouped } from "./choices";
 import classes from "./Compare.module.css";
 import { useChoices } from "./useChoices";
+import { useUpload } from "./useUpload";
 
 /** More than these are not drawn: a word narrows them. */
 const MOST_SHOWN = 80;
+const FILE = "file";
 
 interface Props {
   columns: readonly string[];
@@ -21,6 +23,7 @@ interface Props {
 export function ColumnPicker({ columns, kind, onColumns }: Props) {
   const t = useTexts();
   const [search, setSearch] = useState("");
+  const file = useRef<HTMLInputElement>(null);
   const combobox = useCombobox({
     onDropdownClose: () => {
       combobox.resetSelectedOption();
@@ -32,11 +35,15 @@ export function ColumnPicker({ columns, kind, onColumns }: Props) {
       combobox.selectFirstOption();
     },
   });
+  const upload = useUpload(columns[0] ?? null, kind, (column) => onColumns([...columns, column]));
   const choices = useChoices(kind, columns[0] ?? null);
   const found = foundChoices(choices, search);
   const full = columns.length >= MOST_COLUMNS;
   const submit = (value: string) => {
-    if (columns.includes(value)) onColumns(columns.filter((one) => one !== value));
+    if (value === FILE) {
+      combobox.closeDropdown();
+      file.current?.click();
+    } else if (columns.includes(value)) onColumns(columns.filter((one) => one !== value));
     else if (!full) onColumns([...columns, value]);
   };
   return (
@@ -65,6 +72,15 @@ export function ColumnPicker({ columns, kind, onColumns }: Props) {
             data-testid="column-search"
           />
           <Combobox.Options className={classes.options} aria-label={t("page.compare.picker.list")}>
+            <Combobox.Option value={FILE} data-testid="column-file">
+              <span className={classes.option}>
+                <IconFileUpload size={17} aria-hidden />
+                <span>
+                  {t("page.compare.picker.file")}
+                  <small>{t("page.compare.picker.file_hint")}</small>
+                </span>
+              </span>
+            </Combobox.Option>
             {grouped(found.slice(0, MOST_SHOWN)).map(([group, members]) => (
               <Combobox.Group key={group} label={group}>
                 {members.map((one) => {
@@ -74,7 +90,7 @@ export function ColumnPicker({ columns, kind, onColumns }: Props) {
                       key={one.column}
                       value={one.column}
                       active={chosen}
-                      disabled={full && !chosen}
+                      disabled={!chosen && (full || one.absent)}
                       data-testid={`choice-${one.column}`}
                     >
                       <span className={classes.option}>
@@ -98,6 +114,19 @@ export function ColumnPicker({ columns, kind, onColumns }: Props) {
           </Combobox.Options>
         </Combobox.Dropdown>
       </Combobox>
+      <input
+        ref={file}
+        type="file"
+        accept=".json,.dcf,.csv"
+        hidden
+        aria-label={t("page.compare.picker.file")}
+        onChange={(event) => {
+          const [chosen] = event.currentTarget.files ?? [];
+          event.currentTarget.value = "";
+          if (chosen) void upload(chosen);
+        }}
+        data-testid="column-upload"
+      />
     </>
   );
 }

@@ -54,7 +54,8 @@ export function CompareHead({ compared, against, onColumns }: Props) {
       >
         <div className={classes.columnHead}>
           <strong>{place}</strong>
-          <em>{more === "" || column.kind === "live" ? source : `${source} · ${more}`}</em>
+          <em>{source}</em>
+          {more !== "" && <em>{more}</em>}
           <small data-some={!reference && count > 0}>{said}</small>
         </div>
         {onColumns && (

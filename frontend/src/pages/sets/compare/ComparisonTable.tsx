@@ -12,7 +12,8 @@ const SECTION_PX = 36;
 const ROW_PX = 40;
 const DETAIL_PX = 30;
 const OVERSCAN = 6;
-const HEAD_PX = 62;
+/** The tallest head: place, state, when, and what it comes to. */
+const HEAD_PX = 84;
 
 const heightOf = (line: CompareLine | undefined): number => {
   if (line?.kind === "section") return SECTION_PX;

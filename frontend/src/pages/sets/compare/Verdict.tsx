@@ -5,13 +5,12 @@ import classes from "./Compare.module.css";
 
 type Summary = ComparisonDoc["summary"];
 
-const PARTS = ["different", "same", "unit", "missing", "not_comparable", "unread"] as const;
-/** What is worth a word only where there is any. */
-const SILENT: readonly (typeof PARTS)[number][] = ["not_comparable", "unread"];
+const PARTS = ["different", "same", "unit", "missing", "not_comparable"] as const;
 
 /** "7 differ, 120 match, 2 bound to this unit, 0 not found". */
 export function sentenceOf(summary: Summary, t: Translate): string {
-  return PARTS.filter((part) => !SILENT.includes(part) || summary[part] > 0)
+  // Most comparisons have nothing that cannot be compared: worth a word only where there is.
+  return PARTS.filter((part) => part !== "not_comparable" || summary[part] > 0)
     .map((part) =>
       t(`page.compare.sum.${part}${summary[part] === 1 ? "_one" : ""}`, { count: summary[part] }),
     )
@@ -28,7 +27,18 @@ export function Verdict({ summary }: { summary: Summary }) {
   return (
     <p className={classes.sentence} role="status" data-testid="verdict">
       <Icon size={24} className={tone} aria-hidden />
-      <span>{sentenceOf(summary, t)}</span>
+      <span>
+        {sentenceOf(summary, t)}
+        {summary.unread > 0 && (
+          <small>
+            {" "}
+            ·{" "}
+            {t(summary.unread === 1 ? "page.compare.sum.unread_one" : "page.compare.sum.unread", {
+              count: summary.unread,
+            })}
+          </small>
+        )}
+      </span>
     </p>
   );
 }

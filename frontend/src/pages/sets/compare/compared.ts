@@ -1,8 +1,13 @@
 /** Rows and columns of a comparison together with what the descriptions say of them. */
 import { useQueries } from "@tanstack/react-query";
 import { useMemo } from "react";
-import type { CellDoc, ColumnDoc, ComparisonDoc, RowDoc } from "../../../api/compare";
-import { descriptionQuery } from "../../../api/queries";
+import {
+  type CellDoc,
+  type ColumnDoc,
+  type ComparisonDoc,
+  knownDescriptionQuery,
+  type RowDoc,
+} from "../../../api/compare";
 import type { DescriptionDoc, EntryDoc, Raw } from "../../../api/types";
 import { type ParameterRow, rowsOf } from "../../../model/rows";
 import type { DeviceContext } from "../../../model/shown";
@@ -31,7 +36,7 @@ export function useCompared(doc: ComparisonDoc | undefined): Compared | null {
   const t = useTexts();
   const ids = useMemo(() => [...new Set(doc?.columns.map((one) => one.description_id))], [doc]);
   const descriptions = useQueries({
-    queries: ids.map((id) => descriptionQuery(id)),
+    queries: ids.map((id) => knownDescriptionQuery(id)),
     combine: (results) => results.map((one) => ({ data: one.data, settled: !one.isPending })),
   });
   const settled = descriptions.every((one) => one.settled);

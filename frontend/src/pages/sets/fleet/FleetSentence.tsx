@@ -1,0 +1,32 @@
+import { IconCircleCheck, IconEqualNot } from "@tabler/icons-react";
+import type { FleetDoc } from "../../../api/fleet";
+import { useTexts } from "../../../texts/texts";
+import { dateAndTime } from "../../../ui/format";
+import { useFleetDevice } from "./deviceLabel";
+import classes from "./Fleet.module.css";
+
+/** What it comes to, and what the fleet is held against. */
+export function FleetSentence({ doc }: { doc: FleetDoc }) {
+  const t = useTexts();
+  const nameOf = useFleetDevice();
+  const { golden, total, equal, parameters, foreign } = doc;
+  const odd = total - equal;
+  const Icon = odd > 0 ? IconEqualNot : IconCircleCheck;
+  const when = golden.t_ns === null ? "–" : dateAndTime(golden.t_ns / 1e6);
+  return (
+    <div className={classes.sentence} role="status" data-testid="fleet-sentence">
+      <Icon size={24} className={odd > 0 ? "tone-warning" : "tone-ok"} aria-hidden />
+      <strong>
+        {total === 0
+          ? t("page.fleet.no_devices")
+          : t(odd === 1 ? "page.fleet.sentence_one" : "page.fleet.sentence", { odd, total, parameters })}
+      </strong>
+      <span className="dim">{t("page.fleet.against", { device: nameOf(golden.device), when })}</span>
+      {foreign.length > 0 && (
+        <span className="tone-warning" title={foreign.map((one) => one.device).join("\n")}>
+          {t("page.fleet.foreign", { count: foreign.length })}
+        </span>
+      )}
+    </div>
+  );
+}
