@@ -13,10 +13,11 @@ from typing import Any, Final
 
 from app.cli.connecting import connected, run_command
 from app.cli.output import Output
-from app.cli.targets import add_connection, find_device
+from app.cli.restore import BARE_STATION, add_terms, restore
+from app.cli.targets import add_connection, find_device, site_turbine
 from app.cli.users import opened
 from app.errors import MotorUnknownError, UsageError
-from app.model.address import Address, parse_address
+from app.model.address import Address, is_decimal, parse_address
 from app.model.description import Entry
 from app.model.motor import (
     PLATE_FIELDS,
@@ -74,6 +75,12 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     exporting = action("export", _export, "write motors as CSV")
     exporting.add_argument("motor", nargs="*", help=f"all but the examples where none is named; {MOTOR_HELP}")
     exporting.add_argument("--file", type=Path, help="write to a file instead of stdout")
+    applying = actions.add_parser("apply", help="put a motor into a drive: a restore, planned, confirmed, proven")
+    applying.add_argument("motor", help=MOTOR_HELP)
+    applying.add_argument("--device", metavar="TARGET", required=True, help="the drive")
+    add_connection(applying)
+    add_terms(applying)
+    applying.set_defaults(run=_apply)
     assigning = action("assign", _assign, "note which motor a device drives", "motor")
     assigning.add_argument("device", help="TURBINE/STATION/DEVICE")
     action("delete", _delete, "list a motor no more; its versions stay readable", "motor")
@@ -307,6 +314,23 @@ async def _delete(arguments: argparse.Namespace, output: Output, motors: Motors)
 
 
 # -- devices, and how things are shown ---------------------------------------------
+
+
+def _apply(arguments: argparse.Namespace, output: Output) -> int:
+    motor = asyncio.run(_spec(arguments))
+    nothing = {"station": None, "select": None, "resume": None, "roll_back": None, "list": False}
+    return restore(argparse.Namespace(**vars(arguments) | nothing | {"set": [motor]}), output)
+
+
+async def _spec(arguments: argparse.Namespace) -> str:
+    """How a restore names the motor and its drive. Raises MotorUnknownError, UsageError, StoreError."""
+    turbine = site_turbine(arguments)
+    if turbine is None and not is_decimal(arguments.device):
+        raise UsageError(reason="--device is a node number where no site file is named")
+    slug = f"{BARE_STATION}/{arguments.device}" if turbine is None else find_device(turbine, arguments.device).slug
+    async with opened(arguments) as (store, audit):
+        motor = await Motors(store, audit, time.time_ns).find(arguments.motor)
+    return f"motor:{motor.id}@{motor.version}:{slug}"
 
 
 async def _read(arguments: argparse.Namespace, output: Output) -> tuple[str, dict[Address, int]]:
