@@ -22,7 +22,7 @@ check: $(VENV)/.ready frontend/node_modules/.ready
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
-	$(PY) -m pytest tests/test_layers.py tests/test_generated.py tests/model/test_eds_write.py tests/model/test_texts.py
+	$(PY) -m pytest tests/test_layers.py tests/test_generated.py tests/test_generated_rules.py tests/model/test_eds_write.py tests/model/test_texts.py
 	cd frontend && npm run --silent check
 
 bench: setup
@@ -81,6 +81,7 @@ generate: $(VENV)/.ready frontend/node_modules/.ready
 	cd frontend && npm run --silent generate
 	$(BIN)/hubside od export --all-eds od/eds
 	$(PY) -m tests.twins.make_page docs/twins.md
+	HUBSIDE_LANGUAGE=en $(BIN)/hubside sets rules --format md > docs/rules.md
 
 # Lock files hold versions and hashes and no registry host.
 lock:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import csv
-import io
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,6 +15,7 @@ from app.errors import RefusedError, SetFileError, UsageError
 from app.model.description import Description
 from app.model.description_file import BUILTIN, load_builtin
 from app.model.rules.all_rules import ALL
+from app.model.rules.listing import WRITERS, to_json
 from app.model.rules.rule import Finding, Rule, Severity, Verdict
 from app.model.set_head import Taking
 from app.model.set_import import read_set_file
@@ -27,13 +26,12 @@ from app.service.rule_check import Judged, check_sets
 BROKEN: Final = RefusedError.exit_code
 """Exit code where a rule of weight ``error`` is broken: a restore to such a station is refused before it sends."""
 _MARKS: Final = {Severity.ERROR: "✕", Severity.WARNING: "!", Severity.NOTE: "·"}
-_COLUMNS: Final = ("id", "severity", "stepwise", "section", "objects", "title", "why")
 
 
 def add_actions(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Register the actions."""
     listing = actions.add_parser("rules", help="list the rules that stations are judged by")
-    listing.add_argument("--format", choices=("text", "csv", "json"), default="text")
+    listing.add_argument("--format", choices=("text", *WRITERS), default="text")
     listing.set_defaults(run=_list)
     check = actions.add_parser(
         "check",
@@ -49,11 +47,11 @@ def add_actions(actions: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 
 def _list(arguments: argparse.Namespace, output: Output) -> int:
+    texts = output.texts
     if output.as_json or arguments.format == "json":
-        output.as_json = True
-        output.result([_rule_json(rule, output) for rule in ALL], "")
-    elif arguments.format == "csv":
-        output.raw(_rules_csv(output))
+        output.raw(to_json(ALL, texts))
+    elif arguments.format in WRITERS:
+        output.raw(WRITERS[arguments.format](ALL, texts))
     else:
         head = ("ID", "WEIGHT", "STEPWISE", "MANUAL", "TITLE")
         output.table(head, [_rule_row(rule, output) for rule in ALL])
@@ -64,29 +62,6 @@ def _rule_row(rule: Rule, output: Output) -> tuple[str, ...]:
     stepwise = output.texts("cli.stepwise") if rule.stepwise else ""
     weight = output.texts(f"rule.severity.{rule.severity.value}")
     return (rule.id, weight, stepwise, rule.section, output.texts(f"rule.{rule.id}.title"))
-
-
-def _rule_json(rule: Rule, output: Output) -> dict[str, Any]:
-    return {
-        "id": rule.id,
-        "severity": rule.severity.value,
-        "stepwise": rule.stepwise,
-        "section": rule.section,
-        "objects": {kind: list(addresses) for kind, addresses in rule.objects.items()},
-        "title": output.texts(f"rule.{rule.id}.title"),
-        "why": output.texts(f"rule.{rule.id}.why"),
-    }
-
-
-def _rules_csv(output: Output) -> str:
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\r\n")
-    writer.writerow(_COLUMNS)
-    for rule in ALL:
-        row = _rule_json(rule, output)
-        objects = " ".join(f"{kind}/{address}" for kind, found in rule.objects.items() for address in found)
-        writer.writerow([{**row, "objects": objects, "stepwise": int(rule.stepwise)}[name] for name in _COLUMNS])
-    return text.getvalue()
 
 
 # -- the check -----------------------------------------------------------------------

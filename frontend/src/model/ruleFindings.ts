@@ -1,5 +1,5 @@
 /** Findings of the server's rules, as the page looks at them: by place, by what is being edited, in words. */
-import type { Language } from "../api/types";
+import type { Details, Language } from "../api/types";
 import type { PendingValues, RuleDoc, RuleFinding, StationFindings } from "../api/rules";
 import type { Translate } from "../texts/texts";
 import { type Change, keyOf } from "./staged";
@@ -62,8 +62,9 @@ export const touching = (findings: readonly RuleFinding[], pending: PendingValue
 /** What is wrong, or not known, in one line. */
 export function lineOfFinding(finding: RuleFinding, t: Translate): string {
   if (!isBroken(finding)) return t("rule.not_checked", finding.details);
-  const details = Object.entries(finding.details).map(([name, one]) => [name, spoken(one, t.language)]);
-  return t(`rule.${finding.rule}.broken`, Object.fromEntries(details));
+  const details: Details = {};
+  for (const [name, one] of Object.entries(finding.details)) details[name] = spoken(one, t.language);
+  return t(`rule.${finding.rule}.broken`, details);
 }
 
 const spoken = (detail: number | string, language: Language): string =>
