@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from hashlib import blake2b
 from typing import Final
 
-from app.model.address import Address, parse_address
+from app.model.address import Address
 from app.model.datatypes import Raw
 
 WIDTH: Final = 4
@@ -31,12 +31,18 @@ def layout_of(values: Mapping[Address, Raw]) -> tuple[str, ...]:
 
 def pack(values: Mapping[Address, Raw], layout: Sequence[str]) -> bytes:
     """The words of ``values`` in the order of ``layout``, which must be theirs. Raises KeyError where it is not."""
-    return b"".join(words(values[address], count) for address, count in parse_layout(layout))
+    known = {str(address): raw for address, raw in values.items()}
+    return b"".join(words(known[text.removesuffix(_TWO)], 2 if text.endswith(_TWO) else 1) for text in layout)
 
 
-def parse_layout(layout: Sequence[str]) -> list[tuple[Address, int]]:
-    """The addresses of a layout, each with the number of its words."""
-    return [(parse_address(text.removesuffix(_TWO)), 2 if text.endswith(_TWO) else 1) for text in layout]
+def places(layout: Sequence[str]) -> dict[str, tuple[int, int]]:
+    """Where the words of each address begin, and how many there are. Addresses are texts, as ``str`` gives them."""
+    found, start = {}, 0
+    for text in layout:
+        count = 2 if text.endswith(_TWO) else 1
+        found[text.removesuffix(_TWO)] = start, count
+        start += count
+    return found
 
 
 def words(raw: Raw, count: int) -> bytes:

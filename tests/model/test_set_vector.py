@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from app.model.address import Address, Addressing
 from app.model.datatypes import DataType, Raw
 from app.model.description_file import BUILTIN, load_builtin
-from app.model.set_vector import WIDTH, layout_of, pack, parse_layout
+from app.model.set_vector import WIDTH, layout_of, pack, places, words
 
 INTEGERS = st.integers(-(2**63), 2**64 - 1)
 RAW = INTEGERS | st.floats(allow_nan=False) | st.text(max_size=40) | st.binary(max_size=40)
@@ -17,10 +17,16 @@ ADDRESSES = st.builds(Address, st.integers(0, 0xFFFF), st.integers(0, 0xFF), st.
 
 
 @given(st.dictionaries(ADDRESSES, RAW, max_size=20))
-def test_a_layout_names_every_address_in_its_order(values: dict[Address, int]) -> None:
+def test_a_layout_names_every_address_in_its_order(values: dict[Address, Raw]) -> None:
     layout = layout_of(values)
-    assert [address for address, _words in parse_layout(layout)] == sorted(values)
-    assert len(pack(values, layout)) == WIDTH * sum(count for _address, count in parse_layout(layout))
+    found = places(layout)
+    assert list(found) == [str(address) for address in sorted(values)]
+    vector, end = pack(values, layout), 0
+    for address, (start, count) in zip(sorted(values), found.values(), strict=True):
+        assert start == end
+        end += count
+        assert vector[WIDTH * start : WIDTH * end] == words(values[address], count)
+    assert len(vector) == WIDTH * end
 
 
 TYPES = [one for one in DataType if one.range is not None and not (one.is_signed and (one.bits or 0) > 32)]

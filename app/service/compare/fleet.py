@@ -8,22 +8,22 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from itertools import repeat
-from typing import Any, Final, NamedTuple
+from itertools import groupby
+from operator import itemgetter
+from typing import Any, Final, NamedTuple, overload
 
 import numpy as np
 import numpy.typing as npt
 
-from app.model.address import Address
 from app.model.description import Description, Entry, RestoreClass
 from app.model.diff.compare import is_parameter
-from app.model.set_vector import WIDTH, layout_of, pack, parse_layout
+from app.model.set_vector import WIDTH, layout_of, pack, places
 from app.service.compare.sources import Columns, Shown
 from app.store.fleet_rows import layouts_of, scan_latest
 from app.store.store import Connection, Store
 
 Bools = npt.NDArray[np.bool_]
-Counts = npt.NDArray[np.int64]
+Counts = npt.NDArray[np.uint16]
 Indices = npt.NDArray[np.intp]
 
 _WORD: Final = np.dtype(f"<u{WIDTH}")
@@ -41,10 +41,37 @@ class Mark(Enum):
 class Member(NamedTuple):
     """The latest set of one device. ``version`` is that of the description that it was read by."""
 
-    record: str
     device: str
+    record: str
     t_ns: int
     version: str
+
+
+class Members(Sequence[Member]):
+    """Many of them, kept as columns: thousands are found before a few are shown."""
+
+    def __init__(self) -> None:
+        self._columns: tuple[list[Any], ...] = ([], [], [], [])
+
+    def add(self, devices: Sequence[str], records: Sequence[str], times: Sequence[int], version: str) -> None:
+        """Add some that have the version in common."""
+        versions = [version] * len(devices)
+        for column, more in zip(self._columns, (devices, records, times, versions), strict=True):
+            column += more
+
+    def __len__(self) -> int:
+        return len(self._columns[0])
+
+    @overload
+    def __getitem__(self, place: int) -> Member: ...
+
+    @overload
+    def __getitem__(self, place: slice) -> list[Member]: ...
+
+    def __getitem__(self, place: int | slice) -> Member | list[Member]:
+        if isinstance(place, slice):
+            return [self[one] for one in range(*place.indices(len(self)))]
+        return Member(*(column[place] for column in self._columns))
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,17 +98,18 @@ class Fleet:
 
     def by_group(self) -> Counts:
         """Differences that must not be, a row for each member and a column for each group."""
-        groups = self.groups
-        places = np.array([groups.index(entry.group) for entry in self.entries], np.intp)
-        counting = np.zeros((len(self.entries), len(groups)), np.float32)
-        counting[np.arange(len(places)), places] = ~self.bound
-        found: Counts = (self.differs.astype(np.float32) @ counting).astype(np.int64)
+        names = [entry.group for entry in self.entries]
+        starts = [names.index(group) for group in self.groups]  # the entries of a group stand together
+        if not starts:
+            return np.zeros((len(self.members), 0), np.uint16)
+        found: Counts = np.add.reduceat(self._marked(Mark.DIFFERENT), starts, axis=1, dtype=np.uint16)
         return found
 
     def ranking(self) -> list[int]:
         """Rows of the members: most differences first, then what is missing, then as they come."""
-        different, missing = np.array(self.count(Mark.DIFFERENT)), np.array(self.count(Mark.MISSING))
-        return [int(row) for row in np.lexsort((-missing, -different))]
+        different, missing = (np.count_nonzero(self._marked(mark), axis=1) for mark in (Mark.DIFFERENT, Mark.MISSING))
+        rows: list[int] = np.lexsort((-missing, -different)).tolist()
+        return rows
 
     def count(self, mark: Mark) -> list[int]:
         """How often each member has it."""
@@ -132,8 +160,8 @@ class _Scan:
         self._golden = golden
         self._entries = _parameters(golden)
         self._plans: dict[int, _Plan] = {}
-        self._members: list[Member] = []
-        self._strangers: list[Member] = []
+        self._members = Members()
+        self._strangers = Members()
         self._differs: list[Bools] = []
         self._lacks: list[Bools] = []
 
@@ -141,25 +169,23 @@ class _Scan:
         """Scan the store."""
         column = self._golden.column
         layouts = layouts_of(connection, column.description.id)
-        words = _Words.of(layout_of(column.values), pack(column.values, layout_of(column.values)))
+        layout = layout_of(column.values)
+        words = _Words(places(layout), np.frombuffer(pack(column.values, layout), _WORD))
         for number, (version, addresses) in layouts.items():
             self._plans[number] = _Plan(words, self._entries, version, addresses)
+            self._plans[number].foreign = _major(version) != _major(column.version)
         scan_latest(connection, list(layouts), self._take)
 
     def _take(self, rows: Sequence[Any]) -> None:
-        by_layout: dict[int, list[Any]] = {}
-        for row in rows:
-            by_layout.setdefault(row[3], []).append(row)
-        for number, some in by_layout.items():
+        for number, some in groupby(rows, key=itemgetter(3)):
             plan = self._plans[number]
             devices, records, times, _layouts, vectors = zip(*some, strict=True)
-            found = map(Member, records, devices, times, repeat(plan.version))
-            if _major(plan.version) != _major(self._golden.column.version):
-                self._strangers += found
+            if plan.foreign:
+                self._strangers.add(devices, records, times, plan.version)
                 continue
-            self._members += found
+            self._members.add(devices, records, times, plan.version)
             self._differs.append(plan.differs(b"".join(vectors)))
-            self._lacks.append(np.broadcast_to(plan.lacks, (len(some), len(plan.lacks))))
+            self._lacks.append(np.broadcast_to(plan.lacks, (len(devices), len(plan.lacks))))
 
     def fleet(self) -> Fleet:
         """What was found."""
@@ -179,12 +205,8 @@ class _Scan:
 class _Words:
     """The golden set: where the words of each address begin, how many there are, and all words."""
 
-    places: Mapping[Address, tuple[int, int]]
+    places: Mapping[str, tuple[int, int]]
     words: npt.NDArray[np.uint32]
-
-    @classmethod
-    def of(cls, layout: Sequence[str], vector: bytes) -> _Words:
-        return cls(_places(layout), np.frombuffer(vector, _WORD))
 
 
 class _Plan:
@@ -192,7 +214,8 @@ class _Plan:
 
     def __init__(self, golden: _Words, entries: Sequence[Entry], version: str, addresses: Sequence[str]) -> None:
         self.version = version
-        theirs = _places(addresses)
+        self.foreign = False
+        theirs = places(addresses)
         self._words = sum(count for _start, count in theirs.values())
         own: list[int] = []
         other: list[int] = []
@@ -201,8 +224,9 @@ class _Plan:
         self._unlike = np.zeros(len(entries), bool)
         self.lacks = np.zeros(len(entries), bool)
         for number, entry in enumerate(entries):
-            start, count = golden.places[entry.address]
-            place = theirs.get(entry.address)
+            text = str(entry.address)
+            start, count = golden.places[text]
+            place = theirs.get(text)
             if place is None:
                 self.lacks[number] = True
             elif place[1] != count:
@@ -233,15 +257,6 @@ def _slice_of(numbers: list[int]) -> slice | Indices:
     if numbers and numbers == list(range(numbers[0], numbers[0] + len(numbers))):
         return slice(numbers[0], numbers[0] + len(numbers))
     return np.array(numbers, np.intp)
-
-
-def _places(layout: Sequence[str]) -> dict[Address, tuple[int, int]]:
-    """Where the words of each address begin, and how many there are."""
-    places, start = {}, 0
-    for address, count in parse_layout(layout):
-        places[address] = start, count
-        start += count
-    return places
 
 
 def _parameters(golden: Shown) -> tuple[Entry, ...]:
