@@ -108,7 +108,7 @@ ROUTES: Final[dict[tuple[str, str], Role]] = {
     ("POST", "/api/live/restores/{restore_id}/confirm"): TECHNICIAN,
     ("POST", "/api/live/restores/{restore_id}/roll-back"): TECHNICIAN,
     ("POST", "/api/live/restores/{restore_id}/resume"): TECHNICIAN,
-    ("GET", "/api/records/{file}"): VIEWER,
+    ("GET", "/api/records/{record_file}"): VIEWER,
     # faults in our own twins
     ("GET", "/api/instructor"): VIEWER,
     ("GET", "/api/instructor/catalogue"): VIEWER,
@@ -162,6 +162,7 @@ PLACES: Final = {
     "{user_id}": "0197a000-0000-7000-8000-000000000000",
     "{job_id}": "none",
     "{fault}": "1",
+    "{record_file}": "none.json",
     "{restore_id}": "0197a000-0000-7000-8000-000000000000",
     "{name}": "none.mcap",
     "{key}": "none",

@@ -84,14 +84,16 @@ async def resume_restore(bench: BenchOf, person: PersonOf, restore_id: str, _req
     return await _doc(bench, restore_id)
 
 
-@router.get("/records/{file}", response_class=Response)
-async def record_file(bench: BenchOf, file: str, locale: Annotated[Literal["en", "de"], Query()] = "en") -> Response:
+@router.get("/records/{record_file}", response_class=Response)
+async def record_file(
+    bench: BenchOf, record_file: str, locale: Annotated[Literal["en", "de"], Query()] = "en"
+) -> Response:
     """The signed record of a restore: ``<id>.html``, ``<id>.pdf`` or ``<id>.json``."""
-    restore_id, _, form = file.rpartition(".")
+    restore_id, _, form = record_file.rpartition(".")
     sealed = await bench.restores.record(restore_id) if form in _MEDIA else None
     key = None if sealed is None else await asyncio.to_thread(bench.restores.key)
     if sealed is None or key is None:
-        raise NotFoundError(what=file)
+        raise NotFoundError(what=record_file)
     if form == "json":
         content = sealed.json.encode()
     else:

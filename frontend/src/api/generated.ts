@@ -1334,7 +1334,7 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
-    "/api/records/{file}": {
+    "/api/records/{record_file}": {
         parameters: {
             query?: never;
             header?: never;
@@ -10794,7 +10794,7 @@ export interface operations {
             };
             header?: never;
             path: {
-                file: string;
+                record_file: string;
             };
             cookie?: never;
         };
