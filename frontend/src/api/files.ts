@@ -1,7 +1,7 @@
-/** Recordings and sets of the data folder. Their lists are asked again while files were not read yet, or one grows. */
+/** Recordings of the data folder. Their list is asked again while files were not read yet, or one grows. */
 import { queryOptions } from "@tanstack/react-query";
 import { get } from "./client";
-import type { RecordingDoc, RecordingList, SetDoc, SetList } from "./types";
+import type { RecordingDoc, RecordingList } from "./types";
 
 const FILLING_MS = 700;
 const GROWING_MS = 10_000;
@@ -27,22 +27,3 @@ export const recordingQuery = (name: string | undefined) =>
 export const recordingDownload = (name: string) => `${recordingPath(name)}/download`;
 export const attachmentDownload = (name: string, attachment: string) =>
   `${recordingPath(name)}/attachment?attachment=${encodeURIComponent(attachment)}`;
-
-export const setsQuery = queryOptions({
-  queryKey: ["sets"],
-  queryFn: ({ signal }) => get<SetList>("/api/sets", signal),
-  staleTime: 0,
-  refetchInterval: (query) =>
-    query.state.data?.files.some((file) => file.head === null && file.reason === null)
-      ? FILLING_MS
-      : GROWING_MS,
-});
-
-export const setQuery = (name: string | undefined) =>
-  queryOptions({
-    queryKey: ["set", name],
-    queryFn: ({ signal }) => get<SetDoc>(`/api/sets/${name ?? ""}`, signal),
-    enabled: name !== undefined,
-  });
-
-export const setDownload = (name: string) => `/api/sets/${name}/download`;

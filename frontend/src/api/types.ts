@@ -43,7 +43,8 @@ export type RecordingList = Schemas["RecordingList"];
 export type RecordingRef = Schemas["RecordingRef"];
 export type RecordingDoc = Schemas["RecordingDoc"];
 export type SetList = Schemas["SetList"];
-export type SetRef = Schemas["SetRef"];
+export type SetRecord = Schemas["SetRecordDoc"];
+export type SetTag = Schemas["SetTag"];
 export type SetDoc = Schemas["SetDoc"];
 
 /** What fills the placeholders of a text. */

@@ -1,7 +1,7 @@
 import { IconArrowRight, IconCircle, IconCircleCheckFilled, IconHelpCircle } from "@tabler/icons-react";
 import { useQueries, useQuery } from "@tanstack/react-query";
 import { Link } from "@tanstack/react-router";
-import { setsQuery } from "../../api/files";
+import { setsQuery } from "../../api/sets";
 import { descriptionQuery, turbineQuery } from "../../api/queries";
 import { roomSearch, usePageSearch } from "../../frame/search";
 import { store, useHearing, useLink, useNodes, useServerNow, useWatchDevice } from "../../live/live";
@@ -71,7 +71,7 @@ function useFacts(): Facts {
     nodes: useNodes(),
     cellsOf: (device) => store.cells(device),
     docs: new Map(docs.flatMap(({ data }) => (data ? [[data.id, data] as const] : []))),
-    sets: useQuery(setsQuery).data?.files,
+    sets: useQuery(setsQuery).data?.records,
     nowMs: useServerNow(REFRESH_MS),
   };
 }

@@ -1,5 +1,5 @@
 /** The guided steps, and how each is seen to be done. Pure: what is known of the bench in, ticks out. */
-import type { LinkData, NodeData, RecordingStatus, SetRef, Turbine } from "../../api/types";
+import type { LinkData, NodeData, RecordingStatus, SetRecord, Turbine } from "../../api/types";
 import type { Cell } from "../../live/store";
 import { placesOf } from "../../ui/devices";
 import { isUnsaved } from "../parameters/cellValue";
@@ -19,7 +19,7 @@ export interface Facts {
   nodes: ReadonlyMap<string, NodeData>;
   cellsOf: (device: string) => ReadonlyMap<string, Cell> | undefined;
   docs: ReadonlyMap<string, DescriptionDoc>;
-  sets: readonly SetRef[] | undefined;
+  sets: readonly SetRecord[] | undefined;
   nowMs: number;
 }
 
@@ -68,10 +68,10 @@ function readOf(facts: Facts): number {
 function freshSets(facts: Facts): number {
   return devicesOf(facts).filter((device) =>
     facts.sets?.some(
-      ({ head }) =>
-        head?.origin.device === device.slug &&
-        head.unread === 0 &&
-        facts.nowMs - Date.parse(head.origin.time) < FRESH_BACKUP_MS,
+      (one) =>
+        one.origin.device === device.slug &&
+        one.unread === 0 &&
+        facts.nowMs - one.t_ns / 1e6 < FRESH_BACKUP_MS,
     ),
   ).length;
 }

@@ -10,6 +10,7 @@ import { ProblemAlert } from "../../ui/ProblemAlert";
 import room from "../../ui/Room.module.css";
 import { bytes, dayAndTime } from "../../ui/format";
 import { Download, RecordingState } from "./RecordingsPage";
+import { RecoverSets } from "./RecoverSets";
 
 /** What one recording holds, where it lies, and what is missing in it. */
 export function RecordingDetails({ file }: { file: RecordingRef }) {
@@ -65,6 +66,7 @@ function Content({ doc }: { doc: RecordingDoc }) {
         </div>
       )}
       <Missing doc={doc} />
+      <RecoverSets name={doc.name} />
       {doc.attachments.length > 0 && (
         <div>
           <h3>{t("page.recordings.attachments")}</h3>

@@ -3,7 +3,7 @@ import { IconDeviceFloppy, IconX } from "@tabler/icons-react";
 import { useMutation, useQuery } from "@tanstack/react-query";
 import { useEffect, useState } from "react";
 import { commands } from "../../../api/client";
-import { setsQuery } from "../../../api/files";
+import { setsQuery } from "../../../api/sets";
 import { jobQuery, queryClient, turbineQuery } from "../../../api/queries";
 import type { Job } from "../../../api/types";
 import { NeedsRole } from "../../../frame/NeedsRole";
@@ -12,7 +12,7 @@ import { useTexts } from "../../../texts/texts";
 import { age } from "../../../ui/format";
 import { notify } from "../../../ui/notices";
 import { storyOf } from "../../../ui/problem";
-import classes from "./Sets.module.css";
+import classes from "./Library.module.css";
 
 const MAX_REASON = 500;
 const KEY = ["backing-up"];

@@ -1,57 +1,79 @@
-import { ActionIcon } from "@mantine/core";
-import {
-  IconAlertTriangle,
-  IconCircleCheck,
-  IconDownload,
-  IconFileAlert,
-  IconHourglass,
-} from "@tabler/icons-react";
+import { Chip, Group } from "@mantine/core";
+import { IconFileAlert } from "@tabler/icons-react";
 import { useQuery } from "@tanstack/react-query";
 import { useMemo } from "react";
-import { setDownload, setsQuery } from "../../../api/files";
-import type { SetRef } from "../../../api/types";
+import { setsQuery } from "../../../api/sets";
+import type { SetList } from "../../../api/types";
 import { usePageSearch } from "../../../frame/search";
-import { type Translate, useTexts } from "../../../texts/texts";
-import { DataTable, type TableColumn } from "../../../ui/DataTable";
+import { useTexts } from "../../../texts/texts";
+import { DataTable } from "../../../ui/DataTable";
 import { ProblemAlert } from "../../../ui/ProblemAlert";
 import room from "../../../ui/Room.module.css";
-import { dayAndTime } from "../../../ui/format";
 import { BackUp } from "./BackUp";
+import { columnsOf, HIDDEN_FIRST } from "./columns";
+import { ImportSet } from "./ImportSet";
+import { pickedOf, toggled } from "./selection";
+import { SelectionTools } from "./SelectionTools";
 import { SetDetails } from "./SetDetails";
+import { tagKey } from "./TagChips";
+import classes from "./Library.module.css";
 
-/** Parameter sets in the data folder, a backup of the turbine, and one set opened below. */
+const TAGS = ["as-delivered", "golden", "as-found", "as-left"] as const;
+const ALL = "all";
+
+/** All sets that were ever taken, the newest first; one opened below, several picked for what comes next. */
 export function LibraryTab() {
   const t = useTexts();
   const list = useQuery(setsQuery);
   const [search, update] = usePageSearch();
-  const columns = useMemo(() => columnsOf(t), [t]);
-  const files = useMemo(() => list.data?.files.toSorted((a, b) => madeMs(b) - madeMs(a)) ?? [], [list.data]);
-  const opened = files.find((file) => file.name === search.file);
+  const all = useMemo(() => list.data?.records ?? [], [list.data]);
+  const tag = TAGS.find((one) => one === search.only);
+  const shown = useMemo(
+    () => (tag === undefined ? all : all.filter((one) => one.tags.some((given) => given.tag === tag))),
+    [all, tag],
+  );
+  const picked = pickedOf(search);
+  const records = all.filter((one) => picked.includes(one.id));
+  const { sets } = search;
+  const columns = useMemo(
+    () =>
+      columnsOf(t, pickedOf({ ...(sets ? { sets } : {}) }), (id) =>
+        update({ sets: toggled(pickedOf({ ...(sets ? { sets } : {}) }), id) }),
+      ),
+    [t, sets, update],
+  );
+  const opened = all.find((one) => one.id === search.file);
   return (
     <div className={room.room}>
       <div className={room.strip}>
         <h1>{t("page.sets.tab.library")}</h1>
         <BackUp />
         <span className={room.spacer} />
-        {list.data && (
-          <div className={room.facts}>
-            <span className={`${room.path} dim`}>{list.data.folder}</span>
-          </div>
-        )}
+        <ImportSet />
       </div>
       {list.isError && <ProblemAlert error={list.error} title={t("page.sets.failed")} />}
+      {list.data && list.data.bad.length > 0 && <BadFiles list={list.data} />}
       <DataTable
-        label={t("page.rooms.sets")}
-        rows={files}
+        label={t("page.sets.tab.library")}
+        rows={shown}
         columns={columns}
-        idOf={(file) => file.name}
+        idOf={(one) => one.id}
         fileName="hubside-sets"
-        empty={t(list.isPending ? "page.loading" : "page.sets.none")}
-        onOpen={(file) => update({ file: file.name })}
+        empty={t(
+          list.isPending ? "page.loading" : tag === undefined ? "page.sets.none" : "page.sets.none_tagged",
+        )}
+        onOpen={(one) => update({ file: one.id })}
         selected={search.file}
         hiddenFirst={HIDDEN_FIRST}
+        tools={
+          records.length > 0 ? (
+            <SelectionTools records={records} onClear={() => update({ sets: undefined })} />
+          ) : (
+            <TagFilter tag={tag ?? ALL} onTag={(to) => update({ only: to === ALL ? undefined : to })} />
+          )
+        }
       />
-      {opened && <SetDetails key={opened.name} file={opened} />}
+      {opened && <SetDetails key={opened.id} record={opened} />}
       {search.file !== undefined && list.isSuccess && !opened && (
         <p className={room.note}>{t("page.sets.gone", { name: search.file })}</p>
       )}
@@ -59,117 +81,40 @@ export function LibraryTab() {
   );
 }
 
-/** When the set was made, as it says itself; a copied file is not a new set. */
-function madeMs(file: SetRef): number {
-  const made = Date.parse(file.head?.origin.time ?? "");
-  return Number.isNaN(made) ? file.modified_ns / 1e6 : made;
-}
-
-export enum SetState {
-  Complete = "complete",
-  Incomplete = "incomplete",
-  Unusable = "unusable",
-  Unread = "unread",
-}
-
-export function stateOf(file: SetRef): SetState {
-  if (file.reason !== null) return SetState.Unusable;
-  if (file.head === null) return SetState.Unread;
-  return file.head.unread === 0 ? SetState.Complete : SetState.Incomplete;
-}
-
-const LOOKS = {
-  [SetState.Complete]: { Icon: IconCircleCheck, tone: "" },
-  [SetState.Incomplete]: { Icon: IconAlertTriangle, tone: "tone-warning" },
-  [SetState.Unusable]: { Icon: IconFileAlert, tone: "tone-error" },
-  [SetState.Unread]: { Icon: IconHourglass, tone: "dim" },
-};
-
-export function SetStateText({ file }: { file: SetRef }) {
+function TagFilter({ tag, onTag }: { tag: string; onTag: (tag: string) => void }) {
   const t = useTexts();
-  const state = stateOf(file);
-  const { Icon, tone } = LOOKS[state];
   return (
-    <span className={`${room.state} ${tone}`}>
-      <Icon size={15} aria-hidden />
-      {t(`page.sets.state.${state}`, { count: file.head?.unread ?? 0 })}
-    </span>
+    <Chip.Group value={tag} onChange={(to) => onTag(to)}>
+      <Group gap={6} role="radiogroup" aria-label={t("page.sets.column.tags")}>
+        {[ALL, ...TAGS].map((one) => (
+          <Chip key={one} value={one} size="sm" data-testid={`only-${one}`}>
+            {t(one === ALL ? "page.sets.all" : tagKey(one as (typeof TAGS)[number]))}
+          </Chip>
+        ))}
+      </Group>
+    </Chip.Group>
   );
 }
 
-/** `blade-1 / pmc` of `wtg-07/blade-1/pmc`. */
-const placeOf = (slug: string) => slug.split("/").slice(1).join(" / ");
-
-const HIDDEN_FIRST = ["description", "hash", "file", "person"];
-const HASH_SHOWN = 12;
-
-function columnsOf(t: Translate): TableColumn<SetRef>[] {
-  const column = (
-    id: string,
-    width: string,
-    text: (file: SetRef) => string | undefined,
-    more: Partial<TableColumn<SetRef>> = {},
-  ): TableColumn<SetRef> => ({
-    id,
-    title: t(`page.sets.column.${id}`),
-    width,
-    text: (file) => text(file) || "–", // eslint-disable-line @typescript-eslint/prefer-nullish-coalescing -- an empty text is none
-    ...more,
-  });
-  return [
-    column(
-      "state",
-      "minmax(128px, 0.9fr)",
-      (file) => t(`page.sets.state.${stateOf(file)}`, { count: file.head?.unread ?? 0 }),
-      {
-        fixed: true,
-        cell: (file) => <SetStateText file={file} />,
-      },
-    ),
-    column("made", "minmax(152px, 1fr)", (file) => dayAndTime(madeMs(file)), { fixed: true, by: madeMs }),
-    column("turbine", "minmax(70px, 0.6fr)", (file) => file.head?.origin.turbine.toUpperCase()),
-    column("device", "minmax(110px, 0.8fr)", (file) => placeOf(file.head?.origin.device ?? file.name), {
-      fixed: true,
-    }),
-    column("values", "70px", (file) => file.head?.values.toString(), {
-      numeric: true,
-      by: (file) => file.head?.values ?? null,
-    }),
-    column("serial", "minmax(80px, 0.6fr)", (file) => file.head?.identity.serial?.toString(), {
-      by: (file) => file.head?.identity.serial ?? null,
-    }),
-    column("reason", "minmax(100px, 1.4fr)", (file) => file.head?.origin.reason),
-    column("person", "minmax(80px, 0.7fr)", (file) => file.head?.origin.person),
-    column("description", "minmax(110px, 0.7fr)", (file) =>
-      file.head ? `${file.head.description_id} ${file.head.description_version}` : undefined,
-    ),
-    column("hash", "120px", (file) => file.head?.hash.slice(0, HASH_SHOWN)),
-    column("file", "minmax(160px, 1.6fr)", (file) => file.name),
-    {
-      id: "download",
-      title: "",
-      width: "44px",
-      fixed: true,
-      text: () => "",
-      cell: (file) => <Download file={file} />,
-    },
-  ];
-}
-
-function Download({ file }: { file: SetRef }) {
+/** Files of the data folder that are no sets: each with its line and the reason. */
+function BadFiles({ list }: { list: SetList }) {
   const t = useTexts();
-  const label = t("page.recordings.download", { name: file.name });
   return (
-    <ActionIcon
-      component="a"
-      href={setDownload(file.name)}
-      download
-      variant="subtle"
-      aria-label={label}
-      title={label}
-      onClick={(event: React.MouseEvent) => event.stopPropagation()}
-    >
-      <IconDownload size={17} aria-hidden />
-    </ActionIcon>
+    <details className={`${room.note} ${classes.bad}`} data-testid="bad-files">
+      <summary>
+        <IconFileAlert size={16} aria-hidden />{" "}
+        {t(list.bad.length === 1 ? "page.sets.bad_one" : "page.sets.bad", {
+          count: list.bad.length,
+          folder: list.folder,
+        })}
+      </summary>
+      <ul className={room.list}>
+        {list.bad.map((one) => (
+          <li key={one.name}>
+            <span>{t("page.sets.bad_line", { name: one.name, line: one.line, reason: one.reason })}</span>
+          </li>
+        ))}
+      </ul>
+    </details>
   );
 }

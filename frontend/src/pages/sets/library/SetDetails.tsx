@@ -1,40 +1,38 @@
-import { Checkbox, CloseButton } from "@mantine/core";
-import { IconAlertTriangle } from "@tabler/icons-react";
+import { Button, CloseButton, Menu } from "@mantine/core";
+import { IconDownload } from "@tabler/icons-react";
 import { useQuery } from "@tanstack/react-query";
-import { useMemo } from "react";
-import { setQuery } from "../../../api/files";
-import { descriptionQuery, turbineQuery } from "../../../api/queries";
-import type { DescriptionDoc, EntryDoc, Raw, SetDoc, SetRef } from "../../../api/types";
+import { knownDescriptionQuery, setDownload, type SetFormat, setQuery } from "../../../api/sets";
+import type { SetDoc, SetRecord } from "../../../api/types";
 import { usePageSearch } from "../../../frame/search";
-import { useDeviceVersion, useWatchDevice } from "../../../live/live";
-import { titleOf } from "../../../model/rows";
-import { lineOf, shownOf } from "../../../model/shown";
-import { type Translate, useTexts } from "../../../texts/texts";
+import { useTexts } from "../../../texts/texts";
 import { ProblemAlert } from "../../../ui/ProblemAlert";
 import room from "../../../ui/Room.module.css";
-import { placesOf } from "../../../ui/devices";
-import { entriesOf, rawAt } from "../../../ui/reading";
+import { entriesOf } from "../../../ui/reading";
+import { titleOf } from "../../../model/rows";
 import { Pairs } from "../../recordings/RecordingDetails";
-import classes from "./Sets.module.css";
-import { SetStateText } from "./LibraryTab";
-import { setRows, type SetRow } from "./rows";
+import { Completeness, nameOf } from "./columns";
+import classes from "./Library.module.css";
+import { Nameplate } from "./Nameplate";
+import { SelectionTools } from "./SelectionTools";
+import { TagChips } from "./TagChips";
+import { ValueTable } from "./ValueTable";
 
-/** One set: whose it is, its values in words, and beside them what the device holds now, where it is connected. */
-export function SetDetails({ file }: { file: SetRef }) {
+/** One set: whose it is, its tags, what was not read, its values in words, and what can be done with it. */
+export function SetDetails({ record }: { record: SetRecord }) {
   const t = useTexts();
   const [, update] = usePageSearch();
-  const doc = useQuery(setQuery(file.reason === null ? file.name : undefined));
+  const doc = useQuery(setQuery(record.id));
   return (
-    <section className={room.details} aria-label={file.name} data-testid="set-details">
+    <section className={room.details} aria-label={nameOf(record)} data-testid="set-details">
       <div className={room.detailsHead}>
-        <h2>{file.name}</h2>
-        <SetStateText file={file} />
+        <h2>{nameOf(record)}</h2>
+        <Completeness record={record} />
+        <TagChips tags={record.tags} />
         <span className={room.spacer} />
+        <SelectionTools records={[record]} />
+        <Export record={record} />
         <CloseButton aria-label={t("page.close")} onClick={() => update({ file: undefined })} />
       </div>
-      {file.reason !== null && (
-        <p className={room.note}>{t("page.sets.unusable", { reason: file.reason })}</p>
-      )}
       <div className={room.detailsBody}>
         {doc.isError && <ProblemAlert error={doc.error} title={t("page.sets.unreadable")} />}
         {doc.isLoading && <span className="dim">{t("page.loading")}</span>}
@@ -44,133 +42,66 @@ export function SetDetails({ file }: { file: SetRef }) {
   );
 }
 
+const FORMATS: readonly SetFormat[] = ["json", "dcf", "csv"];
+
+function Export({ record }: { record: SetRecord }) {
+  const t = useTexts();
+  return (
+    <Menu position="bottom-end" withinPortal>
+      <Menu.Target>
+        <Button
+          variant="default"
+          leftSection={<IconDownload size={17} aria-hidden />}
+          data-testid="export-set"
+        >
+          {t("page.sets.export")}
+        </Button>
+      </Menu.Target>
+      <Menu.Dropdown>
+        {FORMATS.filter((one) => one !== "dcf" || record.description_id.startsWith("oat-")).map((one) => (
+          <Menu.Item
+            key={one}
+            component="a"
+            href={setDownload(record.id, one)}
+            download
+            data-testid={`export-${one}`}
+          >
+            {t(`page.sets.format.${one}`)}
+          </Menu.Item>
+        ))}
+      </Menu.Dropdown>
+    </Menu>
+  );
+}
+
 function Content({ doc }: { doc: SetDoc }) {
   const t = useTexts();
-  const [search, update] = usePageSearch();
-  const device = doc.head.origin.device;
-  const turbine = useQuery(turbineQuery).data ?? undefined;
-  const here = placesOf(turbine).some((place) => place.device.slug === device);
-  useWatchDevice(here ? device : null);
-  const version = useDeviceVersion(device);
-  const description = useQuery({
-    ...descriptionQuery(doc.head.description_id),
-    enabled: turbine !== undefined,
-  }).data;
-  const rows = useMemo(
-    () => setRows(doc.values, (address) => (here ? rawAt(device, address) : null)),
-    // eslint-disable-next-line react-hooks/exhaustive-deps -- the version stands for what the store holds
-    [doc, device, here, version],
-  );
-  const different = rows.filter((row) => row.different);
-  const shown = search.compare === "different" ? different : rows;
+  const description = useQuery(knownDescriptionQuery(doc.record.description_id)).data;
   return (
     <>
-      <div className={room.detailsHead} style={{ padding: "8px 0", border: 0 }}>
-        {here ? (
-          <>
-            <Checkbox
-              label={t("page.sets.only_different")}
-              checked={search.compare === "different"}
-              onChange={(event) => update({ compare: event.currentTarget.checked ? "different" : undefined })}
-              data-testid="only-different"
-            />
-            <span className="dim" data-testid="different-count">
-              {t("page.sets.different", { count: different.length, total: rows.length })}
-            </span>
-          </>
-        ) : (
-          <span className="dim">{t("page.sets.not_here", { device })}</span>
-        )}
-      </div>
       <details className={classes.facts} data-testid="set-facts">
         <summary>{t("page.sets.facts")}</summary>
         <div className={room.columns}>
           <Head doc={doc} />
-          <Identity doc={doc} />
-          <Unread doc={doc} />
+          <Identity record={doc.record} />
+          <Nameplate device={doc.record.origin.device} />
         </div>
       </details>
-      <ValueTable
-        rows={shown}
-        description={description}
-        device={device}
-        node={doc.head.origin.node}
-        here={here}
+      <Unread
+        doc={doc}
+        nameOf={(address) => {
+          const entry = description && entriesOf(description).get(address);
+          return entry ? titleOf(entry, t) : "";
+        }}
       />
+      <ValueTable doc={doc} description={description} />
     </>
   );
 }
 
-interface ValueTableProps {
-  rows: readonly SetRow[];
-  description: DescriptionDoc | undefined;
-  device: string;
-  node: number;
-  here: boolean;
-}
-
-function ValueTable({ rows, description, device, node, here }: ValueTableProps) {
-  const t = useTexts();
-  const inSet = new Map(rows.map((row) => [row.address, row.raw]));
-  const words = (raw: Raw | null, address: string, lookup: (address: string) => Raw | null) =>
-    raw === null ? "–" : valueWords(description, device, node, t, address, raw, lookup);
-  return (
-    <table className={classes.values}>
-      <thead>
-        <tr>
-          <th>{t("page.table.column.address")}</th>
-          <th>{t("page.table.column.name")}</th>
-          <th>{t("page.sets.in_set")}</th>
-          {here && <th>{t("page.sets.now")}</th>}
-        </tr>
-      </thead>
-      <tbody>
-        {rows.map((row) => {
-          const entry = description && entriesOf(description).get(row.address);
-          return (
-            <tr key={row.address} data-testid={`set-${row.address}`}>
-              <td>{row.address}</td>
-              <td>{entry ? titleOf(entry, t) : "–"}</td>
-              <td title={t("page.entry.raw_only", { raw: row.raw })}>
-                {words(row.raw, row.address, (address) => inSet.get(address) ?? null)}
-              </td>
-              {here && (
-                <td className={row.different ? classes.different : ""}>
-                  {row.different && <IconAlertTriangle size={14} aria-label={t("page.sets.differs")} />}{" "}
-                  {words(row.now, row.address, (address) => rawAt(device, address))}
-                </td>
-              )}
-            </tr>
-          );
-        })}
-        {rows.length === 0 && (
-          <tr>
-            <td colSpan={here ? 4 : 3} className="dim">
-              {t("page.sets.all_same")}
-            </td>
-          </tr>
-        )}
-      </tbody>
-    </table>
-  );
-}
-
-function valueWords(
-  doc: DescriptionDoc | undefined,
-  slug: string,
-  node: number,
-  t: Translate,
-  address: string,
-  raw: Raw,
-  lookup: (address: string) => Raw | null,
-): string {
-  const entry: EntryDoc | undefined = doc && entriesOf(doc).get(address);
-  return doc && entry ? lineOf(shownOf(entry, raw, { slug, node, doc, lookup, t })) : String(raw);
-}
-
 function Head({ doc }: { doc: SetDoc }) {
   const t = useTexts();
-  const { origin, description_id, description_version, hash } = doc.head;
+  const { origin, description_id, description_version, hash, source } = doc.record;
   return (
     <div>
       <h3>{t("page.sets.origin")}</h3>
@@ -180,23 +111,24 @@ function Head({ doc }: { doc: SetDoc }) {
           [t("page.sets.column.made"), origin.time],
           [t("page.sets.column.person"), origin.person || "–"],
           [t("page.sets.column.reason"), origin.reason || "–"],
+          [t("page.sets.column.order"), origin.work_order || "–"],
+          [t("page.sets.column.source"), t(`page.sets.source.${source}`)],
           [t("page.sets.column.description"), `${description_id} ${description_version}`],
           [t("page.sets.tool"), origin.tool],
           ["SHA-256", hash],
-          [t("page.sets.where"), doc.path],
         ]}
       />
     </div>
   );
 }
 
-function Identity({ doc }: { doc: SetDoc }) {
+function Identity({ record }: { record: SetRecord }) {
   const t = useTexts();
   return (
     <div>
       <h3>{t("page.sets.identity")}</h3>
       <Pairs
-        pairs={Object.entries(doc.head.identity).map(([name, text]) => [
+        pairs={Object.entries(record.identity).map(([name, text]) => [
           t(`page.sets.identity_of.${name}`),
           text === null ? "–" : String(text),
         ])}
@@ -205,17 +137,16 @@ function Identity({ doc }: { doc: SetDoc }) {
   );
 }
 
-function Unread({ doc }: { doc: SetDoc }) {
+/** Every object that was not read, by name, with the reason. */
+function Unread({ doc, nameOf: nameAt }: { doc: SetDoc; nameOf: (address: string) => string }) {
   const t = useTexts();
   const unread = Object.entries(doc.unread);
+  if (unread.length === 0)
+    return <p className={classes.plain}>{t("page.sets.unread_none", { empty: doc.empty.length })}</p>;
   return (
-    <div>
-      <h3>{t("page.sets.unread")}</h3>
-      {unread.length === 0 ? (
-        <p style={{ margin: 0, fontSize: 13 }}>{t("page.sets.unread_none", { empty: doc.empty.length })}</p>
-      ) : (
-        <Pairs pairs={unread} />
-      )}
-    </div>
+    <details className={classes.facts} data-testid="set-unread">
+      <summary className="tone-warning">{t("page.sets.unread", { count: unread.length })}</summary>
+      <Pairs pairs={unread.map(([address, why]) => [`${address} ${nameAt(address)}`, why] as const)} />
+    </details>
   );
 }

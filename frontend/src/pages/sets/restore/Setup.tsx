@@ -1,13 +1,14 @@
 import { Button, CloseButton, Select } from "@mantine/core";
 import { IconBooks } from "@tabler/icons-react";
 import { useQuery } from "@tanstack/react-query";
-import { setsQuery } from "../../../api/files";
+import { setsQuery } from "../../../api/sets";
 import { turbineQuery } from "../../../api/queries";
-import type { SetRecord } from "../../../api/restore";
+import type { SetRecord } from "../../../api/types";
 import { usePageSearch } from "../../../frame/search";
 import { type Translate, useTexts } from "../../../texts/texts";
 import { stationName } from "../../../ui/devices";
 import { dateAndTime } from "../../../ui/format";
+import { GivenName } from "../motors/GivenName";
 import { assign, type Assigned, exchange, others } from "./assign";
 import { setsIn } from "./order";
 import classes from "./Restore.module.css";
@@ -46,7 +47,7 @@ export function Setup() {
         ))}
       {others(records, sets).map((key) => (
         <span key={key} className={classes.other}>
-          {key}
+          <GivenName given={key} />
           <CloseButton
             aria-label={t("page.restoring.take_out", { set: key })}
             onClick={() => onSets(sets.filter((one) => one !== key))}
