@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Final
 
-from app.model.address import parse_address
+from app.model.address import Address, parse_address
 from app.model.rules.rule import Detail, Finding, Rule, Severity, Verdict
 from app.model.station import Place, StationValues
 
@@ -40,6 +41,12 @@ class Found:
     details: Mapping[str, Detail] = field(default_factory=dict)
 
 
+@cache
+def _address(text: str) -> Address:
+    """Rules ask for the same few hundred addresses over and over."""
+    return parse_address(text)
+
+
 class Look:
     """Numbers of one station. What was asked for and is not known is kept in ``missing``."""
 
@@ -58,7 +65,7 @@ class Look:
     def maybe(self, one: Object) -> int | None:
         """The raw value, or None; then it is noted as missing."""
         device = self._station.of_kind(one.description_id)
-        raw = None if device is None else device.number(parse_address(one.address))
+        raw = None if device is None else device.number(_address(one.address))
         if raw is None:
             self.lacks(one)
         return raw
@@ -70,7 +77,7 @@ class Look:
     def place(self, one: Object) -> Place | None:
         """Where the object stands, None where no such device is there."""
         device = self._station.of_kind(one.description_id)
-        return None if device is None else Place(device.slug, parse_address(one.address))
+        return None if device is None else Place(device.slug, _address(one.address))
 
     def places(self, objects: Iterable[Object]) -> tuple[Place, ...]:
         """Where the objects stand, of those devices that are there."""
@@ -80,11 +87,11 @@ class Look:
         """A missing object in words: its address, or its device where that is not there at all."""
         if self._station.of_kind(one.description_id) is None:
             return device_name(one)
-        return parse_address(one.address).short
+        return _address(one.address).short
 
     def holds_default(self, one: Object) -> bool:
         """True where the object holds the default of its description: what is wrong was never set."""
-        device, address = self._station.of_kind(one.description_id), parse_address(one.address)
+        device, address = self._station.of_kind(one.description_id), _address(one.address)
         entry = None if device is None else device.description.entries.get(address)
         if device is None or entry is None or entry.default is None:
             return False
@@ -140,4 +147,4 @@ def _details(look: Look, found: Found) -> Mapping[str, Detail]:
     first = found.objects[0]
     if not look.holds_default(first):
         return found.details
-    return {**found.details, "at_default": parse_address(first.address).short}
+    return {**found.details, "at_default": _address(first.address).short}
