@@ -53,14 +53,15 @@ export function Launch({ planned, order, station, terms, onTerms, confirmMin, on
       {start.isError && <ProblemAlert error={start.error} title={t("page.restoring.not_begun")} />}
       <div className={classes.pair}>
         <TextInput
-          label={t("page.restoring.work_order")}
+          aria-label={t("page.restoring.work_order")}
+          placeholder={t("page.restoring.work_order")}
           value={workOrder}
           maxLength={MAX_WORK_ORDER}
           onChange={(event) => setWorkOrder(event.currentTarget.value)}
           data-testid="work-order"
         />
         <Select
-          label={t("page.restoring.confirm_within")}
+          aria-label={t("page.restoring.confirm_within")}
           data={MINUTES.map((value) => ({ value, label: t("page.restoring.minutes", { count: value }) }))}
           value={String(confirmMin)}
           allowDeselect={false}
@@ -69,7 +70,8 @@ export function Launch({ planned, order, station, terms, onTerms, confirmMin, on
         />
       </div>
       <TextInput
-        label={t("page.restoring.reason")}
+        aria-label={t("page.restoring.reason")}
+        placeholder={t("page.restoring.reason")}
         value={reason}
         maxLength={MAX_REASON}
         onChange={(event) => setReason(event.currentTarget.value)}

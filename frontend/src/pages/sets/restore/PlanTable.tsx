@@ -1,5 +1,12 @@
-import { Checkbox, SegmentedControl } from "@mantine/core";
-import { IconAlertTriangle, IconArrowRight, IconBan, IconEqual, IconSquare } from "@tabler/icons-react";
+import { Button, Checkbox, SegmentedControl } from "@mantine/core";
+import {
+  IconAlertTriangle,
+  IconArrowRight,
+  IconBan,
+  IconEqual,
+  IconRefresh,
+  IconSquare,
+} from "@tabler/icons-react";
 import { useMemo } from "react";
 import { usePageSearch } from "../../../frame/search";
 import { type Translate, useTexts } from "../../../texts/texts";
@@ -12,6 +19,9 @@ interface Props {
   lines: readonly PlanLine[];
   /** Puts lines into the restore, or takes them out. */
   onPick: (changed: readonly PlanLine[], on: boolean) => void;
+  /** The devices are being read. */
+  reading: boolean;
+  onReadAgain: () => void;
 }
 
 const HIDDEN_FIRST = ["group", "address"];
@@ -20,7 +30,7 @@ export const viewIn = (text: string | undefined): View =>
   VIEWS.find((one) => one === text) ?? View.Differences;
 
 /** Every object of the sets with what becomes of it; those that can be written are picked here. */
-export function PlanTable({ lines, onPick }: Props) {
+export function PlanTable({ lines, onPick, reading, onReadAgain }: Props) {
   const t = useTexts();
   const [search, update] = usePageSearch();
   const view = viewIn(search.rows);
@@ -44,6 +54,15 @@ export function PlanTable({ lines, onPick }: Props) {
           onChange={(next) => update({ rows: next === View.Differences ? undefined : next })}
           data-testid="plan-view"
         />
+        <Button
+          variant="default"
+          loading={reading}
+          leftSection={<IconRefresh size={17} aria-hidden />}
+          onClick={onReadAgain}
+          data-testid="plan-again"
+        >
+          {t("page.restoring.read_again")}
+        </Button>
       </div>
       <DataTable
         label={t("page.restoring.plan")}
@@ -67,7 +86,7 @@ function columnsOf(t: Translate, onPick: Props["onPick"]): TableColumn<PlanLine>
     {
       id: "pick",
       title: "",
-      width: "28px",
+      width: "34px",
       fixed: true,
       text: (line) => (isPicked(line) ? "x" : ""),
       cell: (line) => <Pick line={line} onPick={onPick} />,
@@ -75,12 +94,12 @@ function columnsOf(t: Translate, onPick: Props["onPick"]): TableColumn<PlanLine>
     {
       id: "outcome",
       title: title("outcome"),
-      width: "minmax(104px, 0.8fr)",
+      width: "minmax(150px, 1fr)",
       fixed: true,
       text: (line) => line.outcome,
       cell: (line) => <Outcome line={line} />,
     },
-    { id: "device", title: title("device"), width: "96px", text: (line) => line.device },
+    { id: "device", title: title("device"), width: "52px", text: (line) => line.kind },
     { id: "group", title: title("group"), width: "minmax(90px, 0.6fr)", text: (line) => line.groupTitle },
     { id: "address", title: title("address"), width: "72px", text: (line) => line.row.address },
     {

@@ -1,5 +1,4 @@
 import { Button, Loader } from "@mantine/core";
-import { IconRefresh } from "@tabler/icons-react";
 import { useCallback, useState } from "react";
 import { usePageSearch } from "../../../frame/search";
 import { useTexts } from "../../../texts/texts";
@@ -48,23 +47,9 @@ export function PlanView() {
     );
   return (
     <div className={classes.body} aria-busy={planned.outdated} data-testid="restore-plan">
-      <PlanTable lines={lines} onPick={onPick} />
+      <PlanTable lines={lines} onPick={onPick} reading={planned.reading} onReadAgain={planned.readAgain} />
       <aside className={classes.aside}>
         <Told plan={plan} station={station} confirmMin={confirmMin} terms={terms} onTerms={setTerms} />
-        <div className={classes.refresh}>
-          <span className="dim" role="status">
-            {planned.reading ? t("page.restoring.reading", { station }) : ""}
-          </span>
-          <Button
-            variant="subtle"
-            loading={planned.reading}
-            leftSection={<IconRefresh size={17} aria-hidden />}
-            onClick={planned.readAgain}
-            data-testid="plan-again"
-          >
-            {t("page.restoring.read_again")}
-          </Button>
-        </div>
         <Launch
           planned={planned}
           order={order}

@@ -12,6 +12,7 @@ import { useRole } from "../../../frame/role";
 import { type Translate, useTexts } from "../../../texts/texts";
 import { useDeviceName } from "../../../ui/devices";
 import { dateAndTime } from "../../../ui/format";
+import { GivenName, isMotor } from "../motors/GivenName";
 import type { Terms } from "./order";
 import classes from "./Restore.module.css";
 
@@ -141,13 +142,19 @@ function Sources({
     <ul className={classes.sources}>
       {sources.map((one) => (
         <li key={one.device}>
-          {t("page.restoring.source", {
-            device: nameOf(one.device),
-            from: one.from_device,
-            time: dateAndTime(Date.parse(one.time)),
-            person: one.person,
-          })}
-          <small>{t(`page.restoring.unit.${one.same_unit ? "same" : "other"}`)}</small>
+          {isMotor(one.record) ? (
+            <GivenName given={one.record} />
+          ) : (
+            <>
+              {t("page.restoring.source", {
+                device: nameOf(one.device),
+                from: one.from_device,
+                time: dateAndTime(Date.parse(one.time)),
+                person: one.person,
+              })}
+              <small>{t(`page.restoring.unit.${one.same_unit ? "same" : "other"}`)}</small>
+            </>
+          )}
         </li>
       ))}
     </ul>

@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import type { SetRecord } from "../../../api/restore";
+import type { SetRecord } from "../../../api/types";
 import type { DeviceRef } from "../../../api/types";
 import { assign, exchange, others } from "./assign";
 

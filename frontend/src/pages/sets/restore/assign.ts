@@ -1,5 +1,5 @@
 /** Which of the chosen sets goes to which device of a station, as the server assigns them. */
-import type { SetRecord } from "../../../api/restore";
+import type { SetRecord } from "../../../api/types";
 import type { DeviceRef } from "../../../api/types";
 
 export interface Assigned {

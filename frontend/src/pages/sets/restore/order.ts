@@ -5,7 +5,7 @@ import { planQuery, type PlanDoc, type PlanRequest } from "../../../api/restore"
 import { turbineQuery } from "../../../api/queries";
 import type { StationRef } from "../../../api/types";
 import { usePageSearch } from "../../../frame/search";
-import { placesOf, useDeviceName } from "../../../ui/devices";
+import { placesOf } from "../../../ui/devices";
 import { useTexts } from "../../../texts/texts";
 import { useContexts } from "../../parameters/devicesOf";
 import { linesOf, type PlanLine, selectedIn } from "./plan";
@@ -53,15 +53,15 @@ export interface Planned {
 
 export function usePlan(order: PlanRequest | null): Planned {
   const t = useTexts();
-  const nameOf = useDeviceName();
-  const places = placesOf(useQuery(turbineQuery).data ?? undefined);
+  const turbine = useQuery(turbineQuery).data;
+  const places = useMemo(() => placesOf(turbine ?? undefined), [turbine]);
   const contexts = useContexts(places);
   const query = useQuery({ ...planQuery(order), placeholderData: keepPreviousData });
   const plan = query.data;
-  const lines = useMemo(
-    () => (plan ? linesOf(plan, { t, contexts, nameOf }) : []),
-    [plan, t, contexts, nameOf],
-  );
+  const lines = useMemo(() => {
+    const nameOf = (slug: string) => places.find(({ device }) => device.slug === slug)?.device.name ?? slug;
+    return plan ? linesOf(plan, { t, contexts, nameOf }) : [];
+  }, [plan, t, contexts, places]);
   return {
     plan,
     lines,

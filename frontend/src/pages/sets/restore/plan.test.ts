@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import type { PlanDoc, PlanRow } from "../../../api/restore";
+import type { PlanDoc, PlanFinding, PlanRow } from "../../../api/restore";
 import { translator } from "../../../texts/texts";
 import {
   groupsOf,
@@ -90,8 +90,8 @@ describe("what becomes of each object", () => {
       places: [place],
       details: {},
     } as const;
-    const unjudged = { ...finding, rule: "s", verdict: "not-checked" } as const;
-    const doc = plan(ROWS, { unordered: [place], findings: [{ ...finding }, { ...unjudged }] });
+    const unjudged: PlanFinding = { ...finding, rule: "s", verdict: "not-checked" };
+    const doc = plan(ROWS, { unordered: [place], findings: [finding, unjudged] });
     const line = lines(doc)[2];
     expect(line?.unordered).toBe(true);
     expect(line?.rules).toEqual(["r"]);

@@ -20,8 +20,8 @@ export const VIEWS = Object.values(View);
 export interface PlanLine {
   id: string;
   row: PlanRow;
-  /** "Blade 2 PMC". */
-  device: string;
+  /** What the device is called at its station: "PMC". */
+  kind: string;
   title: string;
   groupTitle: string;
   now: string;
@@ -64,7 +64,7 @@ export function linesOf(plan: PlanDoc, { t, contexts, nameOf }: Words): PlanLine
     return {
       id,
       row,
-      device: nameOf(row.device),
+      kind: nameOf(row.device),
       title: entry ? titleOf(entry, t) : row.name,
       groupTitle: row.group === "" ? DASH : t(`group.${row.group}`),
       now: shown(row.now_raw, row.now_shown),
