@@ -5,11 +5,12 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
 from bench import __main__ as command
-from bench import latency, record
+from bench import fleet, latency, record
 from bench._cpu import tree_cpu_s
 from bench._load import PMC_NODES, frames, position_of
 from bench._result import Result
@@ -22,6 +23,16 @@ def test_record_loses_no_frame_of_a_calm_bus() -> None:
     assert done.ratio > 0
     assert not [shortfall for shortfall in done.shortfalls if "lost" in shortfall or "order" in shortfall]
     assert "sent 2500 frames, in our file 2500, in the peer's 2500" in done.lines
+
+
+def test_a_fleet_is_compared_alike_by_both(tmp_path: Path) -> None:
+    done = fleet.measure(sets=60, parameters=40, peer_rounds=1, rounds=1, cache=tmp_path)
+    assert not done.shortfalls
+    assert done.lines[0].startswith("60 sets of 40 parameters, ")
+    assert " 0 differences" not in done.lines[0]
+    again = fleet.measure(sets=60, parameters=40, peer_rounds=1, rounds=1, cache=tmp_path)
+    assert len(list(tmp_path.iterdir())) == 1, "what was generated is kept"
+    assert again.lines[0] == done.lines[0]
 
 
 def test_every_position_on_the_bus_reaches_the_client() -> None:

@@ -6,12 +6,16 @@ import csv
 import io
 import re
 from collections.abc import AsyncIterator
+from dataclasses import replace
 from typing import Any
 
 import pytest
 
+from app.model.address import parse_address
+from app.model.set_record import Source, Tag
 from app.service.as_found import read_as_found
 from app.service.connection import Connection
+from app.service.office.visits import as_known
 from tests.web.rig import Server, running
 
 PMM = "wtg-07/blade-1/pmm"
@@ -126,3 +130,33 @@ async def test_the_csv_file_has_a_row_a_difference_and_one_a_bit(server: Server)
     assert {int(one["bit"]) for one in bits} == {bit for bit in range(16) if (before ^ after) >> bit & 1}
     everything = list(csv.DictReader(io.StringIO(await exported(server, "csv", same=True))))
     assert len(everything) > 90 > len(rows)
+
+
+async def test_a_fleet_is_held_against_its_golden_set(server: Server) -> None:
+    missing = await server.client.post("/api/fleet", json={"description_id": "oat-pmm"})
+    assert (missing.status_code, missing.json()["details"]["column"]) == (404, "golden:oat-pmm")
+    connection, library = server.connection, server.bench.office.library
+    sets = []
+    for blade in (1, 2, 3):
+        target = connection.target(f"wtg-07/blade-{blade}/pmm")
+        made = as_known(target, "wtg-07", "Anna", 1_800_000_000_000_000_000)
+        sets.append(replace(made, values={**made.values, parse_address("3110:01"): 500 if blade == 1 else 490}))
+    records = await library.put(sets, Source.BACKUP)
+    await library.tag(records[0].id, Tag.GOLDEN, "Eva")
+    asked = {"description_id": "oat-pmm", "group": "temperatures", "limit": 2}
+    doc = (await server.client.post("/api/fleet", json=asked)).json()
+    assert (doc["total"], doc["equal"], doc["golden"]["record"]) == (3, 1, records[0].id)
+    assert [(one["device"], one["different"], one["top"]) for one in doc["devices"]] == [
+        ("wtg-07/blade-2/pmm", 1, ["3110:01"]),
+        ("wtg-07/blade-3/pmm", 1, ["3110:01"]),
+    ]
+    first = doc["devices"][0]
+    assert first["by_group"][doc["groups"].index("temperatures")] == 1
+    assert dict(zip(doc["marked"], first["marks"], strict=True))["3110:01"] == "different"
+    (address,) = doc["addresses"]
+    assert (address["address"], address["golden_shown"], address["golden_unit"], address["different"]) == (
+        "3110:01",
+        "50.0",
+        "°C",
+        2,
+    )

@@ -1,6 +1,7 @@
 """One golden set against the latest set of every device of its kind: what differs where, and who stands out.
 
-Vectors are compared as numbers (``model.set_vector``): thousands of sets in some hundredths of a second.
+Vectors are compared as numbers (``model.set_vector``): thousands of sets in some hundredths of a second. They are raw
+values: where the scale of a position differs, it is the scale itself that is counted, not each position.
 """
 
 from __future__ import annotations

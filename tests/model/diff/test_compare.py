@@ -189,7 +189,7 @@ def test_a_class_that_only_one_version_has_does_not_allow_a_difference() -> None
 
 # -- any columns ----------------------------------------------------------------------
 
-RAWS = {
+RAWS: dict[Address, st.SearchStrategy[Raw]] = {
     LIMIT: st.integers(498, 502),
     MASK: st.integers(0, 3),
     OFFSET: st.integers(-2, 2),
