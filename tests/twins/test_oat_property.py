@@ -47,8 +47,15 @@ MODES: Final = (1, 3, 6, 8, 9, -113)
 SCALING: Final = frozenset(
     (0x607C, 0x607E, 0x608F, 0x6091, 0x6092, 0x687C, 0x687E, 0x688F, 0x6891, 0x6892, 0x606A, 0x5894)
 )
-CURRENT_GAINS: Final = {"60F6:01": 16, "60F6:02": 512}
-"""Gain and integral share of the current controller, as delivered."""
+SOUND_GAINS: Final = {
+    "60F6:01": range(4, 65),
+    "60F6:02": range(2049),
+    "60F9:01": range(25, 401),
+    "60F9:02": range(801),
+    "60F9:03": range(101),
+    "60F9:05": range(4),
+}
+"""Gains and filter with which the controllers of current and velocity are damped: within four times those delivered."""
 OWN_RULE: Final = frozenset((0x6040, 0x6060, 0x3040, 0x5040))
 """Objects that have a rule of their own below, not the one for parameters."""
 positions = st.one_of(st.sampled_from((-100, 0, 4500, 8900, 9000, 9600, 36000, 40000)), st.integers(-2000, 12000))
@@ -172,8 +179,8 @@ class BladeUnderAnything(RuleBasedStateMachine):
         node, where, number = write
         if int(where[:4], 16) in SCALING:  # it acts before its acknowledge is heard
             self.witness.scaling_as_fitted = False
-        if where in CURRENT_GAINS and number > 4 * CURRENT_GAINS[where]:
-            self.witness.current_follows = False
+        if number not in SOUND_GAINS.get(where, (number,)):
+            self.witness.controllers_damped = False
         self.put(node, where, number)
 
     @rule(node=nodes, command=st.sampled_from((NmtCommand.START, NmtCommand.START, *NmtCommand)))

@@ -92,8 +92,8 @@ class Witness:
         """What a write of 6060h may make of 6061h."""
         self.scaling_as_fitted = True
         """Encoders, gears and feed are described as they are; positions mean something."""
-        self.current_follows = True
-        """The current controller is not tuned so high that it swings: the loops above it reach the motor through it."""
+        self.controllers_damped = True
+        """Those of current and velocity are not tuned so that they swing."""
         self.taken: list[int] = []
         """All transitions taken."""
         self._machine = rig.pmc.machine
@@ -211,7 +211,7 @@ class Witness:
         """Beyond 6080h and 607Fh the motor brakes, whatever pulls."""
         store = self._number
         rpm, torque = store(0x6044), store(0x6077)
-        pushes = self.current_follows and rpm * torque > 0 and abs(torque) > _CURRENT_PERMILLE
+        pushes = self.controllers_damped and rpm * torque > 0 and abs(torque) > _CURRENT_PERMILLE
         by_motor = self.rig.pmc.drive.feedback is Feedback.MOTOR_ENCODER
         knows_rpm = self.scaling_as_fitted or by_motor  # the blade encoder tells the motor's speed through 6091h
         if t_ns >= self._settling_until_ns and pushes and knows_rpm:
@@ -246,7 +246,7 @@ class Witness:
         angle_deg = self.rig.angle_deg
         limits = drive.plant.constants
         assert limits.low_stop_deg - 0.01 <= angle_deg <= limits.high_stop_deg + 0.01
-        obeys = self.scaling_as_fitted and self.current_follows
+        obeys = self.scaling_as_fitted and self.controllers_damped
         moves = self._state is State.OPERATION_ENABLED and self._mode in (1, 8) and obeys
         if not moves:
             self._has_rested = False
