@@ -1,0 +1,133 @@
+"""A restore that is cut at any instant ends old, new or incomplete, and never says another of these than is true.
+
+Cut is the power of the devices, the process of the tool, or the cable; after every single SDO of a whole restore of one
+station; with devices that answer at once, that save slowly and that acknowledge late. What is true is looked up in the
+twins: in RAM and in the files of their memories. From every restore that is left incomplete both ways out are taken.
+"""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from collections.abc import AsyncIterator, Iterable
+from contextlib import asynccontextmanager
+from pathlib import Path
+from random import Random
+from tempfile import TemporaryDirectory
+from typing import Final
+
+import pytest
+
+from app.service.restore.transaction import End
+from tests.restore_cuts.cuts import Bench, Cut, Kind, Result
+from tests.restore_cuts.station import Station
+from tests.restore_cuts.tool import hurry
+from tests.restore_cuts.trigger import Manner
+
+SAMPLE: Final = 60
+SEED: Final = 1010
+NEVER: Final = 1 << 40
+BEFORE_BEGIN: Final = 5
+"""Cuts before the restore begins: it only reads then."""
+WHOLE_STEP: Final = int(os.environ.get("HUBSIDE_CUTS_STEP", "45"))
+"""Of the SDOs of whole devices every so manieth is a cut point, each kind and manner at others."""
+COMBINATIONS: Final = [(kind, manner) for manner in Manner for kind in Kind]
+
+
+@pytest.fixture
+async def bench(monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Bench]:
+    """A station with the objects that matter here."""
+    async with _benched(monkeypatch, whole=False) as one:
+        yield one
+
+
+@pytest.fixture
+async def whole_bench(monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Bench]:
+    """A station with all objects of its devices."""
+    async with _benched(monkeypatch, whole=True) as one:
+        yield one
+
+
+@asynccontextmanager
+async def _benched(monkeypatch: pytest.MonkeyPatch, whole: bool) -> AsyncIterator[Bench]:
+    hurry(monkeypatch.setattr)
+    with TemporaryDirectory(dir=_folder_in_memory()) as folder, Station(Path(folder) / "state") as station:
+        one = Bench(station, Path(folder), whole)
+        await one.prepare()
+        try:
+            yield one
+        finally:
+            one.close()
+
+
+def _folder_in_memory() -> str | None:
+    """No cut is one of our own computer: its disk need not be waited for a thousand times."""
+    return "/dev/shm" if os.access("/dev/shm", os.W_OK) else None
+
+
+@pytest.mark.timeout(900)
+async def test_sixty_cuts(bench: Bench, capsys: pytest.CaptureFixture[str]) -> None:
+    """Spread over the whole restore by a seed; each kind and manner at its beginning, in its midst and at its end."""
+    before, after = await bench.sdos_before(), await _sdos_of(bench, Manner.PLAIN)
+    assert after - before > 60, "reads, writes, verifies, saves, restarts and proves"
+    first, chance = before - BEFORE_BEGIN, Random(SEED)
+    width = (after - first) / SAMPLE
+    cuts = [
+        Cut(*COMBINATIONS[n % len(COMBINATIONS)], first + int((n + chance.random()) * width) + 1, n % 2 == 0)
+        for n in range(SAMPLE)
+    ]
+    results = [await bench.run(cut) for cut in cuts]
+    _tell(capsys, "sample", results)
+    assert sum(one.happened for one in results) > SAMPLE * 0.9
+    ends = Counter((one.cut.kind, one.end) for one in results)
+    for kind in Kind:
+        assert ends[kind, End.INCOMPLETE] > 0, f"{kind.value}: no way out was taken"
+
+
+@pytest.mark.soak
+@pytest.mark.timeout(2 * 3600)
+@pytest.mark.parametrize(("kind", "manner"), COMBINATIONS, ids=lambda one: one.value)
+async def test_every_cut(kind: Kind, manner: Manner, bench: Bench, capsys: pytest.CaptureFixture[str]) -> None:
+    """After every single SDO, from the first that is read to the last proof, and behind it."""
+    count = await _sdos_of(bench, manner)
+    results = []
+    for at in range(1, count + BEFORE_BEGIN):
+        for stays_off in (False, True) if kind is Kind.POWER else (False,):
+            results.append(await bench.run(Cut(kind, manner, at, stays_off)))
+    _tell(capsys, "every SDO", results)
+    assert sum(one.happened for one in results) > len(results) * 0.9
+
+
+@pytest.mark.soak
+@pytest.mark.timeout(2 * 3600)
+@pytest.mark.parametrize(("kind", "manner"), COMBINATIONS, ids=lambda one: one.value)
+async def test_cuts_of_whole_devices(
+    kind: Kind, manner: Manner, whole_bench: Bench, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """With every object that the devices have: hundreds are read before, in between and in the end."""
+    count = await _sdos_of(whole_bench, manner)
+    assert count > 1000
+    first = 1 + COMBINATIONS.index((kind, manner)) * WHOLE_STEP // len(COMBINATIONS)
+    cuts = (Cut(kind, manner, at, at % 2 == 0) for at in range(first, count, WHOLE_STEP))
+    _tell(capsys, "whole devices", [await whole_bench.run(cut) for cut in cuts])
+
+
+async def _sdos_of(bench: Bench, manner: Manner) -> int:
+    """How many SDOs a restore takes that nothing cuts; it ends with the new values."""
+    done = await bench.run(Cut(Kind.CABLE, manner, NEVER))
+    assert done.end is End.NEW
+    assert not done.happened
+    return done.sdos
+
+
+def _tell(capsys: pytest.CaptureFixture[str], title: str, results: Iterable[Result]) -> None:
+    """The numbers, for whoever runs it."""
+    ends: dict[tuple[str, str], Counter[End]] = {}
+    for one in results:
+        ends.setdefault((one.cut.kind.value, one.cut.manner.value), Counter())[one.end] += 1
+    with capsys.disabled():
+        whole = sum((counted for counted in ends.values()), Counter[End]())
+        print(f"\n{whole.total()} cuts ({title}); each incomplete one resumed to new and rolled back to old:")
+        for (kind, manner), counted in [*ends.items(), (("all", ""), whole)]:
+            numbers = ", ".join(f"{counted[end]} {end.value}" for end in End)
+            print(f"  {kind:8} {manner:18} {numbers}")
