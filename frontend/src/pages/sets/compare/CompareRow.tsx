@@ -1,11 +1,11 @@
 import { Checkbox } from "@mantine/core";
-import { IconAlertTriangle, IconChevronDown, IconChevronRight } from "@tabler/icons-react";
+import { IconChevronDown, IconChevronRight } from "@tabler/icons-react";
 import { memo, type ReactNode } from "react";
 import { useTexts } from "../../../texts/texts";
 import { BitCells, FactsCells, ValueCell } from "./Cells";
 import type { ColumnContext } from "./compared";
 import classes from "./Compare.module.css";
-import { FindingText } from "./FindingText";
+import { FindingText, SeveritySign, useSeverity } from "./FindingText";
 import type { CompareLine, RowLine, SectionLine } from "./lines";
 import { Against, cellMarks, Mark } from "./marks";
 import { ClassChip, RowSign } from "./signs";
@@ -169,15 +169,16 @@ function Weight({ line }: { line: RowLine }) {
   const t = useTexts();
   const { row } = line.compared;
   const count = row.findings.length;
+  const severity = useSeverity(row.findings);
   return (
     <>
       <ClassChip restore={row.restore} />
       {count > 0 && (
         <span
-          className={`${classes.findings} tone-warning`}
+          className={classes.findings}
           title={row.findings.map((rule) => t(`rule.${rule}.title`)).join("\n")}
         >
-          <IconAlertTriangle size={16} aria-hidden />
+          <SeveritySign severity={severity} />
           {t(count === 1 ? "page.compare.finding" : "page.compare.findings", { count })}
         </span>
       )}

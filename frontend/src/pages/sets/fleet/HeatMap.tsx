@@ -12,7 +12,7 @@ import { useOpenComparison } from "./open";
 
 /** The strongest shade, in percent: text on it can still be read. */
 const DEEPEST = 40;
-const CELL = "minmax(78px, 1fr)";
+const CELL = "minmax(94px, 1fr)";
 
 type Open = ReturnType<typeof useOpenComparison>;
 
