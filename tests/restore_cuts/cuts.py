@@ -58,6 +58,7 @@ NEW: Final[Mapping[Place, Raw]] = {
 }
 MODE: Final = Place(PMC, parse_address("6060"))
 MODE_BEFORE: Final = 1
+HOMING: Final = 6
 ATTEMPTS: Final = 5
 POWER_BACK_S: Final = 0.03
 Way = Callable[[Connection, str, str], Awaitable[None]]
@@ -302,6 +303,7 @@ class Bench:
         ram, memory = self.station.ram(NEW), self.station.memory(NEW)
         assert self.truth() is end, f"{cut}: {end.value}, but RAM {_short(ram)}, memory {_short(memory)}"
         assert self.others_are_untouched(), cut
+        assert self.station.ram([MODE])[MODE] != HOMING, f"{cut}: the axis was left in homing mode"
 
 
 async def _connected(connection: Connection) -> None:
