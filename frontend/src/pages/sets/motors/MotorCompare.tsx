@@ -41,7 +41,13 @@ export function MotorCompare({ list, form }: Props) {
         <h2>{t("page.motors.compare")}</h2>
         <CloseButton aria-label={t("page.close")} onClick={() => update({ columns: undefined })} />
       </div>
-      <div className={classes.body} data-testid="motor-compared">
+      <div
+        className={classes.body}
+        role="region"
+        aria-label={t("page.motors.content")}
+        tabIndex={0}
+        data-testid="motor-compared"
+      >
         <div className={classes.sides}>
           <SideSelect
             name="left"

@@ -88,7 +88,7 @@ export function MotorPane({ place, list, form }: Props) {
         {!motor.invented && !motor.deleted && <Delete motor={motor} onDone={close} />}
       </div>
       <Apply motor={motor} form={form} />
-      <div className={classes.body}>
+      <div className={classes.body} role="region" aria-label={t("page.motors.content")} tabIndex={0}>
         <MotorContent motor={motor} list={list} form={form} />
       </div>
     </>
