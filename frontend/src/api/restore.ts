@@ -2,6 +2,7 @@
 import { queryOptions } from "@tanstack/react-query";
 import { get, send } from "./client";
 import type { components } from "./generated";
+import type { Language } from "./types";
 
 type Schemas = components["schemas"];
 
@@ -17,8 +18,6 @@ export type RestoreHead = Schemas["RestoreHead"];
 export type RestoreDoc = Schemas["RestoreDoc"];
 export type RestoreValue = Schemas["RestoreValue"];
 export type RestoreStep = Schemas["RestoreStepDoc"];
-/** One occasion on which a set was taken. */
-export type SetRecord = Schemas["SetRecordDoc"];
 export type Way = RestoreDoc["can"][number];
 
 const RUN_POLL_MS = 400;
@@ -68,5 +67,5 @@ export const restoreQuery = (id: string) =>
 
 export type RecordFormat = "html" | "pdf" | "json";
 /** The signed record of a restore, of which the id is the same. */
-export const recordPath = (id: string, format: RecordFormat): string =>
-  `/api/records/${encodeURIComponent(id)}.${format}`;
+export const recordPath = (id: string, format: RecordFormat, language: Language): string =>
+  `/api/records/${encodeURIComponent(id)}.${format}?locale=${language}`;

@@ -98,8 +98,8 @@ function Links({ doc }: { doc: RestoreDoc }) {
       <Button
         component="a"
         variant="default"
-        href={recordPath(doc.id, "html")}
-        target="_blank"
+        href={recordPath(doc.id, "html", t.language)}
+        download
         leftSection={<IconFileCertificate size={17} aria-hidden />}
         data-testid="record-html"
       >
@@ -108,7 +108,8 @@ function Links({ doc }: { doc: RestoreDoc }) {
       <Button
         component="a"
         variant="default"
-        href={recordPath(doc.id, "pdf")}
+        href={recordPath(doc.id, "pdf", t.language)}
+        download
         leftSection={<IconFileTypePdf size={17} aria-hidden />}
         data-testid="record-pdf"
       >
@@ -117,7 +118,8 @@ function Links({ doc }: { doc: RestoreDoc }) {
       <Button
         component="a"
         variant="default"
-        href={recordPath(doc.id, "json")}
+        href={recordPath(doc.id, "json", t.language)}
+        download
         leftSection={<IconJson size={17} aria-hidden />}
         data-testid="record-json"
       >

@@ -94,7 +94,7 @@ function columnsOf(t: Translate, onPick: Props["onPick"]): TableColumn<PlanLine>
     {
       id: "outcome",
       title: title("outcome"),
-      width: "minmax(150px, 1fr)",
+      width: "minmax(196px, 1fr)",
       fixed: true,
       text: (line) => line.outcome,
       cell: (line) => <Outcome line={line} />,

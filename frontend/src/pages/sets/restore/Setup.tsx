@@ -78,8 +78,9 @@ interface SetOfProps {
 
 function SetOf({ assigned: { device, record, choices }, onChange }: SetOfProps) {
   const t = useTexts();
+  const turbine = useQuery(turbineQuery).data?.slug;
   const own = choices.filter((one) => one.origin.device === device.slug);
-  const items = (list: SetRecord[]) => list.map((one) => ({ value: one.id, label: nameOf(one, t) }));
+  const items = (list: SetRecord[]) => list.map((one) => ({ value: one.id, label: nameOf(one, turbine, t) }));
   const groups = [
     { group: t("page.restoring.own_sets"), items: items(own) },
     { group: t("page.restoring.other_sets"), items: items(choices.slice(own.length)) },
@@ -103,9 +104,11 @@ function SetOf({ assigned: { device, record, choices }, onChange }: SetOfProps) 
 
 const MOST_SHOWN = 200;
 
-/** `golden · 2026-11-22 04:31 · wtg-07 / blade-1 / pmc · before the gearbox`. */
-function nameOf(record: SetRecord, t: Translate): string {
-  const tags = record.tags.map((one) => t(`page.restoring.tag.${one.tag}`)).join(", ");
-  const place = record.origin.device.split("/").join(" / ");
-  return [tags, dateAndTime(record.t_ns / 1e6), place, record.origin.reason].filter(Boolean).join(" · ");
+/** `blade-1 · golden · 2026-11-22 04:31 · before the gearbox`; the turbine where it is another one. */
+function nameOf(record: SetRecord, here: string | undefined, t: Translate): string {
+  const { device, turbine, reason } = record.origin;
+  const station = device.split("/").slice(1, -1).join(" / ");
+  const place = turbine === here ? station : `${turbine} / ${station}`;
+  const tags = record.tags.map((one) => t(`page.compare.tag.${one.tag}`)).join(", ");
+  return [place, tags, dateAndTime(record.t_ns / 1e6), reason].filter(Boolean).join(" · ");
 }

@@ -120,7 +120,12 @@ function WhatHappens({ plan, station, confirmMin, terms }: Props) {
           {t("page.restoring.happens.save", { devices })}
           <small>{t("page.restoring.happens.save_all")}</small>
         </li>
-        {terms.restart && <li>{t("page.restoring.happens.restart", { devices })}</li>}
+        {terms.restart && (
+          <li>
+            {t("page.restoring.happens.restart", { devices })}
+            <small className="tone-warning">{t("page.restoring.happens.restart_chain")}</small>
+          </li>
+        )}
         <li>{t(`page.restoring.happens.${terms.restart ? "prove" : "prove_ram"}`)}</li>
       </ol>
       <p className="dim">{t("page.restoring.happens.meanwhile", { station })}</p>

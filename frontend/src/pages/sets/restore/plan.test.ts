@@ -83,13 +83,13 @@ describe("what becomes of each object", () => {
 
   it("marks what has no safe order and what breaks a rule", () => {
     const place = { device: "w/b/pmc", address: "6065" };
-    const finding = {
+    const finding: PlanFinding = {
       rule: "r",
       severity: "error",
       verdict: "broken",
       places: [place],
       details: {},
-    } as const;
+    };
     const unjudged: PlanFinding = { ...finding, rule: "s", verdict: "not-checked" };
     const doc = plan(ROWS, { unordered: [place], findings: [finding, unjudged] });
     const line = lines(doc)[2];
