@@ -110,6 +110,7 @@ function Form({ error, busy, onTake }: FormProps) {
           placeholder={t("page.sets.import.choose")}
           description={t("page.sets.import.kinds")}
           accept=".json,.dcf,.csv,.eds"
+          styles={{ input: { minHeight: 40 } }}
           value={file}
           onChange={setFile}
           data-testid="import-file"

@@ -32,6 +32,7 @@ export function SelectionTools({
     <>
       <Button
         variant="default"
+        px={12}
         leftSection={<IconColumns size={17} aria-hidden />}
         onClick={() => update({ ...leave, sets: undefined, tab: "compare", columns: columnsOf(records) })}
         data-testid="compare-sets"
@@ -40,6 +41,7 @@ export function SelectionTools({
       </Button>
       <Button
         variant="default"
+        px={12}
         disabled={station === null}
         title={station === null ? t("page.sets.restore_one_station") : undefined}
         leftSection={<IconArrowBackUp size={17} aria-hidden />}
@@ -87,6 +89,7 @@ function TagMenu({ records, locked }: { records: readonly SetRecord[]; locked: b
       <Menu.Target>
         <Button
           variant="default"
+          px={12}
           disabled={locked}
           loading={change.isPending}
           leftSection={<IconTag size={17} aria-hidden />}

@@ -26,7 +26,7 @@ export function SetDetails({ record }: { record: SetRecord }) {
     <section className={room.details} aria-label={nameOf(record)} data-testid="set-details">
       <div className={room.detailsHead}>
         <h2>{nameOf(record)}</h2>
-        <Completeness record={record} />
+        {record.unread > 0 && <Completeness record={record} />}
         <TagChips tags={record.tags} />
         <span className={room.spacer} />
         <SelectionTools records={[record]} />
@@ -51,6 +51,7 @@ function Export({ record }: { record: SetRecord }) {
       <Menu.Target>
         <Button
           variant="default"
+          px={12}
           leftSection={<IconDownload size={17} aria-hidden />}
           data-testid="export-set"
         >
