@@ -22,11 +22,13 @@ from app.drivers.contract import LinkState
 from app.errors import HubsideError, RestoreOpenError
 from app.model.address import parse_address
 from app.model.datatypes import Raw
+from app.model.restore.plan import Treatment
 from app.model.sets import dump_set
 from app.model.station import Place
 from app.service.connection import Connection
 from app.service.journal import Journal
 from app.service.office.office import Office
+from app.service.records.check import Verdict, check_file
 from app.service.restore.desk import Desk
 from app.service.restore.order import Cause
 from app.service.restore.survey import survey, targets_of
@@ -293,7 +295,8 @@ class Bench:
         for _ in range(ATTEMPTS):
             await way(one.connection, restore_id, "tester")
             if await desk.wait(restore_id) is goal:
-                return self._holds(goal, cut)
+                self._holds(goal, cut)
+                return await _is_recorded(desk, restore_id, goal)
             outcome = (await desk.get(restore_id)).outcome
             assert outcome["cause"] == Cause.NO_ANSWER.value, f"{cut}: to {goal.value}, {outcome}"
         raise AssertionError(f"{cut}: to {goal.value}, {ATTEMPTS} times without an answer")
@@ -304,6 +307,20 @@ class Bench:
         assert self.truth() is end, f"{cut}: {end.value}, but RAM {_short(ram)}, memory {_short(memory)}"
         assert self.others_are_untouched(), cut
         assert self.station.ram([MODE])[MODE] != HOMING, f"{cut}: the axis was left in homing mode"
+
+
+async def _is_recorded(desk: Desk, restore_id: str, end: End) -> None:
+    """Its record says so, and is sealed by this installation."""
+    sealed, key = await desk.record(restore_id), desk.key()
+    assert sealed is not None and key is not None
+    checked = check_file(sealed.json.encode(), {key.public: "ours"})
+    assert checked.verdict is Verdict.GOOD
+    assert checked.record is not None and checked.record.outcome.value == end.value
+    written = [row for row in checked.record.rows if row.treatment is Treatment.WRITE]
+    assert {(row.device, row.address) for row in written} == {(one.slug, one.address.short) for one in NEW}
+    for row in written:
+        wanted = row.wanted if end is End.NEW else row.was
+        assert row.now == wanted, row
 
 
 async def _connected(connection: Connection) -> None:
@@ -326,7 +343,7 @@ async def _another_desk(one: Tool, data: Path) -> AsyncIterator[Desk]:
     """The desk of another run, on a copy of the store as the cut left it."""
     journal = Journal(one.connection.stamper, "tester")
     office = Office(Store.open(data), journal, one.connection.stamper, "tester")
-    desk = Desk(office, journal, one.connection.stamper, TIMING)
+    desk = Desk(office, journal, one.connection.stamper, TIMING, data=data)
     try:
         yield desk
     finally:

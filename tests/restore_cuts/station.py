@@ -29,6 +29,8 @@ STATION: Final = f"{TURBINE}/blade-1"
 PMM: Final = f"{STATION}/pmm"
 PMC: Final = f"{STATION}/pmc"
 NODES: Final = {PMM: 1, PMC: 11}
+_CONTROLWORD: Final = 0x6040
+_MODE: Final = 0x6060
 _REMOTE: Final = 1 << 9
 _ENABLED: Final = 1 << 2
 """Statusword (manual table 54): the controlword counts; operation is enabled."""
@@ -170,5 +172,9 @@ class Station:
                 for cell in device.store:
                     cell.raw = snapshot.ram[slug][cell.entry.address]
                 device.memory._write(snapshot.memory[slug])
+            for index in (_MODE, _CONTROLWORD):  # the axis is told, as by a write
+                cell = self.devices[PMC].store.cell(index)
+                assert cell.effect is not None
+                cell.effect(cell.raw)
 
         self.do(put)

@@ -84,7 +84,7 @@ async def tool(site: Path, data: Path, whole: bool = False) -> AsyncIterator[Too
     stamper = Stamper(time.time_ns(), time.monotonic_ns)
     journal = Journal(stamper, "tester")
     office = Office(Store.open(data), journal, stamper, "tester")
-    desk = Desk(office, journal, stamper, TIMING)
+    desk = Desk(office, journal, stamper, TIMING, data=data)
     options = Options("tester", data / "recordings", listen_s=0.0)
     connection = Connection(turbine, descriptions(whole), options, stamper=stamper, journal=journal)
     connection.gate.blocks = desk.blocks
