@@ -145,6 +145,10 @@ class Store:
             with self._opened().begin() as connection:
                 return work(connection)
         except DBAPIError as error:
-            usual = isinstance(error.orig, sqlite3.OperationalError | sqlite3.IntegrityError)
-            kind = StoreError if usual else StoreDamagedError
-            raise kind(file=self.file, reason=str(error.orig)) from error
+            raise self._failure(error.orig) from error
+        except sqlite3.Error as error:  # of a cursor that was asked without SQLAlchemy
+            raise self._failure(error) from error
+
+    def _failure(self, error: BaseException | None) -> StoreError:
+        usual = isinstance(error, sqlite3.OperationalError | sqlite3.IntegrityError)
+        return (StoreError if usual else StoreDamagedError)(file=self.file, reason=str(error))

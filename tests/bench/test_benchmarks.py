@@ -26,11 +26,11 @@ def test_record_loses_no_frame_of_a_calm_bus() -> None:
 
 
 def test_a_fleet_is_compared_alike_by_both(tmp_path: Path) -> None:
-    done = fleet.measure(sets=60, parameters=40, peer_rounds=1, rounds=1, cache=tmp_path)
+    done = fleet.measure(sets=60, parameters=40, rounds=1, cache=tmp_path)
     assert not done.shortfalls
     assert done.lines[0].startswith("60 sets of 40 parameters, ")
     assert " 0 differences" not in done.lines[0]
-    again = fleet.measure(sets=60, parameters=40, peer_rounds=1, rounds=1, cache=tmp_path)
+    again = fleet.measure(sets=60, parameters=40, rounds=1, cache=tmp_path)
     assert len(list(tmp_path.iterdir())) == 1, "what was generated is kept"
     assert again.lines[0] == done.lines[0]
 

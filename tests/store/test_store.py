@@ -228,6 +228,14 @@ async def test_what_fails_is_undone_and_what_hangs_is_given_up(tmp_path: Path) -
 # -- kills ----------------------------------------------------------------------------
 
 
+def test_the_drivers_own_errors_are_told_as_those_of_the_store(tmp_path: Path) -> None:
+    with opened(tmp_path) as store:
+        with pytest.raises(StoreError, match="no such table: photos"):
+            store.call(lambda connection: connection.connection.cursor().execute("SELECT * FROM photos"))
+        with pytest.raises(StoreError, match="no such table: photos"):
+            store.call(lambda connection: connection.execute(text("SELECT * FROM photos")).all())
+
+
 @pytest.mark.parametrize("lines", [1, 4, 9])
 def test_a_killed_process_leaves_a_whole_chain_with_all_that_it_said_was_kept(tmp_path: Path, lines: int) -> None:
     command = [sys.executable, "-m", "tests.store.writer_process", str(tmp_path)]

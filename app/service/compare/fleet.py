@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
+from functools import cached_property
 from itertools import groupby
 from operator import itemgetter
 from typing import Any, Final, NamedTuple, overload
@@ -75,13 +76,14 @@ class Members(Sequence[Member]):
         return Member(*(column[place] for column in self._columns))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Fleet:
-    """``members`` in the order of the rows of ``differs`` and ``lacks``, ``entries`` in that of their columns.
+    """``members`` in the order of the rows of ``differs``, ``entries`` in that of its columns.
 
     ``entries`` are the parameters that the golden set has, group by group; ``bound`` tells which of them may differ,
-    because they are bound to the single unit. ``foreign`` are devices whose sets were read by a description of another
-    major version: they are not compared.
+    because they are bound to the single unit. Sets that were read alike lack the same: ``lacks`` has a row for each
+    ``layout`` that a member may have. ``foreign`` are devices whose sets were read by a description of another major
+    version: they are not compared.
     """
 
     golden: Shown
@@ -90,6 +92,7 @@ class Fleet:
     members: Sequence[Member]
     foreign: Sequence[Member]
     differs: Bools
+    layout: Indices
     lacks: Bools
 
     @property
@@ -97,24 +100,34 @@ class Fleet:
         """The groups of the entries, in their order."""
         return tuple(dict.fromkeys(entry.group for entry in self.entries))
 
+    @cached_property
     def by_group(self) -> Counts:
         """Differences that must not be, a row for each member and a column for each group."""
         names = [entry.group for entry in self.entries]
         starts = [names.index(group) for group in self.groups]  # the entries of a group stand together
         if not starts:
             return np.zeros((len(self.members), 0), np.uint16)
-        found: Counts = np.add.reduceat(self._marked(Mark.DIFFERENT), starts, axis=1, dtype=np.uint16)
+        found: Counts = np.add.reduceat(self.differs & ~self.bound, starts, axis=1, dtype=np.uint16)
         return found
 
     def ranking(self) -> list[int]:
         """Rows of the members: most differences first, then what is missing, then as they come."""
-        different, missing = (np.count_nonzero(self._marked(mark), axis=1) for mark in (Mark.DIFFERENT, Mark.MISSING))
-        rows: list[int] = np.lexsort((-missing, -different)).tolist()
+        rows: list[int] = np.lexsort((-self._count(Mark.MISSING), -self._count(Mark.DIFFERENT))).tolist()
         return rows
 
     def count(self, mark: Mark) -> list[int]:
         """How often each member has it."""
-        counts: list[int] = np.count_nonzero(self._marked(mark), axis=1).tolist()
+        counts: list[int] = self._count(mark).tolist()
+        return counts
+
+    def _count(self, mark: Mark) -> npt.NDArray[np.intp]:
+        counts: npt.NDArray[np.intp]
+        if mark is Mark.DIFFERENT:
+            counts = self.by_group.sum(axis=1, dtype=np.intp)
+        elif mark is Mark.MISSING:
+            counts = np.count_nonzero(self.lacks, axis=1)[self.layout]
+        else:
+            counts = np.count_nonzero(self._marked(mark), axis=1)
         return counts
 
     def per_entry(self, mark: Mark) -> list[int]:
@@ -124,7 +137,8 @@ class Fleet:
 
     def marks(self, member: int) -> Iterator[Mark]:
         """One member's row."""
-        for differs, lacks, bound in zip(self.differs[member], self.lacks[member], self.bound, strict=True):
+        lacking = self.lacks[self.layout[member]]
+        for differs, lacks, bound in zip(self.differs[member], lacking, self.bound, strict=True):
             if lacks:
                 yield Mark.MISSING
             elif differs:
@@ -135,13 +149,13 @@ class Fleet:
     def _marked(self, mark: Mark) -> Bools:
         match mark:
             case Mark.MISSING:
-                return self.lacks
+                return self.lacks[self.layout]
             case Mark.DIFFERENT:
                 return self.differs & ~self.bound
             case Mark.UNIT:
                 return self.differs & self.bound
             case Mark.SAME:
-                return ~(self.differs | self.lacks)
+                return ~(self.differs | self.lacks[self.layout])
 
 
 async def compare_fleet(columns: Columns, store: Store, golden: str) -> Fleet:
@@ -164,7 +178,7 @@ class _Scan:
         self._members = Members()
         self._strangers = Members()
         self._differs: list[Bools] = []
-        self._lacks: list[Bools] = []
+        self._layouts: list[int] = []
 
     def read(self, connection: Connection) -> None:
         """Scan the store."""
@@ -173,8 +187,8 @@ class _Scan:
         layout = layout_of(column.values)
         words = _Words(places(layout), np.frombuffer(pack(column.values, layout), _WORD))
         for number, (version, addresses) in layouts.items():
-            self._plans[number] = _Plan(words, self._entries, version, addresses)
-            self._plans[number].foreign = _major(version) != _major(column.version)
+            foreign = _major(version) != _major(column.version)
+            self._plans[number] = _Plan(words, self._entries, version, addresses, len(self._plans), foreign)
         scan_latest(connection, list(layouts), self._take)
 
     def _take(self, rows: Sequence[Any]) -> None:
@@ -186,7 +200,7 @@ class _Scan:
                 continue
             self._members.add(devices, records, times, plan.version)
             self._differs.append(plan.differs(b"".join(vectors)))
-            self._lacks.append(np.broadcast_to(plan.lacks, (len(devices), len(plan.lacks))))
+            self._layouts += [plan.number] * len(devices)
 
     def fleet(self) -> Fleet:
         """What was found."""
@@ -198,7 +212,8 @@ class _Scan:
             members=self._members,
             foreign=self._strangers,
             differs=np.concatenate([none, *self._differs]),
-            lacks=np.concatenate([none, *self._lacks]),
+            layout=np.array(self._layouts, np.intp),
+            lacks=np.array([plan.lacks for plan in self._plans.values()], bool).reshape(-1, len(self._entries)),
         )
 
 
@@ -213,9 +228,16 @@ class _Words:
 class _Plan:
     """How sets of one layout are compared with the golden one: which words of theirs with which of its."""
 
-    def __init__(self, golden: _Words, entries: Sequence[Entry], version: str, addresses: Sequence[str]) -> None:
-        self.version = version
-        self.foreign = False
+    def __init__(
+        self,
+        golden: _Words,
+        entries: Sequence[Entry],
+        version: str,
+        addresses: Sequence[str],
+        number: int,
+        foreign: bool,
+    ) -> None:
+        self.version, self.number, self.foreign = version, number, foreign
         theirs = places(addresses)
         self._words = sum(count for _start, count in theirs.values())
         own: list[int] = []

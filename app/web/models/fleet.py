@@ -170,7 +170,6 @@ def _addresses(fleet: Fleet) -> list[FleetAddress]:
 
 def _devices(fleet: Fleet, group: str | None, limit: int) -> list[FleetDevice]:
     counts = {mark: fleet.count(mark) for mark in (Mark.DIFFERENT, Mark.UNIT, Mark.MISSING)}
-    by_group = fleet.by_group()
     devices = []
     for row in fleet.ranking()[:limit]:
         member = fleet.members[row]
@@ -185,7 +184,7 @@ def _devices(fleet: Fleet, group: str | None, limit: int) -> list[FleetDevice]:
                 different=counts[Mark.DIFFERENT][row],
                 unit=counts[Mark.UNIT][row],
                 missing=counts[Mark.MISSING][row],
-                by_group=by_group[row].tolist(),
+                by_group=fleet.by_group[row].tolist(),
                 top=[entry.address.short for entry, mark in paired if mark is Mark.DIFFERENT][:TOP],
                 marks=[mark.value for entry, mark in paired if entry.group == group],
             )

@@ -89,7 +89,7 @@ async def test_outliers_are_ranked_and_counted_by_group(kept: Kept) -> None:
     ]
     assert fleet.groups == ("io", "all")
     by_device = {
-        member.device[:6]: counts.tolist() for member, counts in zip(fleet.members, fleet.by_group(), strict=True)
+        member.device[:6]: counts.tolist() for member, counts in zip(fleet.members, fleet.by_group, strict=True)
     }
     assert by_device == {"wtg-00": [0, 0], "wtg-01": [1, 1], "wtg-02": [0, 0], "wtg-03": [0, 1], "wtg-04": [0, 0]}
     assert (fleet.count(Mark.UNIT), fleet.count(Mark.MISSING)) == ([0, 1, 1, 0, 0], [0, 0, 0, 1, 0])
