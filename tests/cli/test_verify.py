@@ -48,7 +48,7 @@ def test_our_own_records_are_whole(data: Path, tmp_path: Path, capsys: pytest.Ca
     for piece in ("r.json: whole", "r.html: whole", "r.pdf: whole", "this installation", "wtg-07/blade-2, by anna"):
         assert piece in said
     assert "2026-11-22T10:00:31.500Z" in said
-    assert "New: every value" in said
+    assert "New: every value that was to be restored" in said
     assert "digital twins" in said
     assert said.count("made again, it is the same") == 2
 

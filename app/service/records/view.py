@@ -62,12 +62,12 @@ def view_of(record: RestoreRecord, texts: Texts, language: str, key: PublicKey) 
     tables = (
         _devices(record, texts),
         *(_written(texts, slug, rows) for slug, rows in _by_device(written)),
-        *(_skipped(texts, slug, rows) for slug, rows in _by_device(_treated(record, Treatment.SKIP))),
-        *(_equal(texts, slug, rows) for slug, rows in _by_device(_treated(record, Treatment.EQUAL))),
-        _checks(record.checks, texts),
         _findings(record.findings, texts),
+        _checks(record.checks, texts),
         _events(record, texts),
         _steps(record, texts),
+        *(_skipped(texts, slug, rows) for slug, rows in _by_device(_treated(record, Treatment.SKIP))),
+        *(_equal(texts, slug, rows) for slug, rows in _by_device(_treated(record, Treatment.EQUAL))),
     )
     return View(
         language=language,
