@@ -42,10 +42,10 @@ def make_connection() -> Connection:
     return Connection(turbine, _descriptions(), Options(person="tester", recordings=None))
 
 
-def bench_with(connection: Connection, store: Store | None = None) -> Bench:
+def bench_with(connection: Connection, store: Store | None = None, data: Path | None = None) -> Bench:
     """A bench that serves ``connection``."""
     sites = Sites((connection.turbine,), lambda _turbine: _descriptions())
-    options = Options("tester", None)
+    options = Options("tester", None, data=data)
     bench = Bench(sites, options, store=store, stamper=connection.stamper, journal=connection.journal)
     bench.show(connection)
     return bench
@@ -126,10 +126,11 @@ async def running(
     page: Path | None = None,
     signed_in: bool = True,
     store: Store | None = None,
+    data: Path | None = None,
 ) -> AsyncIterator[Server]:
     """Start a server; stop it at the end."""
     connection = connection or make_connection()
-    bench = bench_with(connection, store)
+    bench = bench_with(connection, store, data)
     listener = open_port(0)
     port = port_of(listener)
     access = Access(bench.office.sessions, port)

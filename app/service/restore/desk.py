@@ -80,6 +80,7 @@ class Desk:
     ) -> None:
         self.blocks = Blocks()
         self.running: Running | None = None
+        self._starting = asyncio.Lock()
         self._endings: set[asyncio.Future[None]] = set()
         self._office = office
         self._store = office.store
@@ -137,13 +138,21 @@ class Desk:
         ``agreed``: hash of the plan that the person has looked at. Raises RestoreChangedError where it is another one,
         RestoreRefusedError where something speaks against it, RestoreOpenError.
         """
-        self.require_idle()
         order = prepared.order
         if agreed is not None and agreed != prepared.hash:
             raise RestoreChangedError(station=order.station)
         if prepared.refusals:
             refusals = [one.as_detail() for one in prepared.refusals]
             raise RestoreRefusedError(station=order.station, count=len(refusals), refusals=refusals)
+        async with self._starting:
+            self.require_idle()
+            found = self._open_at(connection, order.station)
+            if found is not None:
+                raise RestoreOpenError(station=order.station, restore=found)
+            return await self._begin(connection, prepared)
+
+    async def _begin(self, connection: Connection, prepared: Prepared) -> str:
+        order = prepared.order
         restore_id = self._new_id()
         before = await self._keep(prepared.found, REASON_BEFORE, order.person, Source.UNDO)
         details = detail.details_of(connection, prepared, {one.origin.device: one.id for one in before})
@@ -156,7 +165,7 @@ class Desk:
         kept = Kept(row, tuple(values), ())
         transaction = self._transaction(connection, kept, order.person, prepared.targets)
         transaction.found = prepared.found
-        self._run(kept, transaction, transaction.forward(prepared.plan, order.confirm_s), order.person)
+        await self._run(kept, transaction, transaction.forward(prepared.plan, order.confirm_s), order.person)
         return restore_id
 
     # -- decide -------------------------------------------------------------------------
@@ -181,13 +190,15 @@ class Desk:
         if transaction is not None:
             transaction.turn_back(person)
             return
-        kept, transaction = await self._take_on(connection, restore_id, person, Kind.RESTORE_TURNED_BACK)
-        self._run(kept, transaction, transaction.back(), person)
+        async with self._starting:
+            kept, transaction = await self._take_on(connection, restore_id, person, Kind.RESTORE_TURNED_BACK)
+            await self._run(kept, transaction, transaction.back(), person)
 
     async def resume(self, connection: Connection | None, restore_id: str, person: str) -> None:
         """On to the new values. Raises RestoreUnknownError, RestoreStateError, UsageError."""
-        kept, transaction = await self._take_on(connection, restore_id, person, Kind.RESTORE_RESUMED)
-        self._run(kept, transaction, transaction.resume(), person)
+        async with self._starting:
+            kept, transaction = await self._take_on(connection, restore_id, person, Kind.RESTORE_RESUMED)
+            await self._run(kept, transaction, transaction.resume(), person)
 
     async def _take_on(
         self, connection: Connection | None, restore_id: str, person: str, kind: Kind
@@ -228,9 +239,10 @@ class Desk:
         )
         return Transaction(hands, log, terms)
 
-    def _run(self, kept: Kept, transaction: Transaction, way: Coroutine[Any, Any, End], person: str) -> None:
+    async def _run(self, kept: Kept, transaction: Transaction, way: Coroutine[Any, Any, End], person: str) -> None:
         task = asyncio.create_task(self._watched(kept.row, transaction, way, person))
         self.running = Running(kept.row.id, kept.row.station, transaction, task)
+        await asyncio.sleep(0)  # it has begun: whatever ends it from now on is seen by itself
 
     async def _watched(
         self, row: RestoreRow, transaction: Transaction, way: Coroutine[Any, Any, End], person: str
@@ -254,7 +266,13 @@ class Desk:
         if transaction.broken is not None:
             self._broken[row.id] = transaction.broken
         self._shut()
-        self.running = None
+        try:
+            await self._keep_end(row, transaction, end, person)
+        finally:
+            self.running = None
+
+    async def _keep_end(self, row: RestoreRow, transaction: Transaction, end: End, person: str) -> None:
+        """What is kept of the end: journal, values as they are now, record, motors."""
         details = {"station": row.station, "restore": row.id}
         cause = Cause.CANCELLED if transaction.broken is None else transaction.broken.cause
         if end is not End.NEW:

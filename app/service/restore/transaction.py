@@ -124,17 +124,17 @@ class Transaction:
         self._tell(Kind.RESTORE_RESUMED)
         return await self._guarded(self._go_on(), falls_back=False)
 
-    async def back(self, cause: Cause | None = None) -> End:
+    async def back(self) -> End:
         """To the old values from whatever is there."""
         self._tell(Kind.RESTORE_TURNED_BACK)
-        return await self._guarded(self._go_back(cause), falls_back=False)
+        return await self._guarded(self._go_back(), falls_back=False)
 
     async def _guarded(self, way: object, falls_back: bool) -> End:
         """Whatever happens, the state that is kept in the end tells the truth."""
         try:
             return await way  # type: ignore[misc, no-any-return]
         except Broken as broken:
-            self.broken = broken
+            self.broken = self.broken or broken
             wanted_back = broken.cause is Cause.CANCELLED
             if not (falls_back or wanted_back) or not broken.cause.allows_rollback:
                 return await self._incomplete(broken)
@@ -144,7 +144,7 @@ class Transaction:
         except Exception as error:
             log.exception("a restore failed by a defect")
             return await self._incomplete(Broken(Cause.DEFECT, "", HubsideError(reason=repr(error))))
-        return await self._guarded(self._go_back(self.broken.cause), falls_back=False)
+        return await self._guarded(self._go_back(), falls_back=False)
 
     async def _incomplete(self, broken: Broken) -> End:
         self.broken = self.broken or broken
@@ -165,7 +165,7 @@ class Transaction:
         plan = await self._plan(Direction.RESUME, options)
         return await self._go(self._all_steps(plan, Direction.RESUME), Direction.RESUME, None)
 
-    async def _go_back(self, cause: Cause | None) -> End:
+    async def _go_back(self) -> End:
         known = {} if self.broken is None else _outcome_of(self.broken)
         if self._back_by is not None:
             self._tell(Kind.RESTORE_TURNED_BACK, self._back_by)

@@ -203,7 +203,8 @@ def _can(state: RestoreState, transaction: Transaction | None) -> list[Literal["
         return ["resume", "roll-back"] if state is RestoreState.INCOMPLETE else []
     if state is RestoreState.AWAITING_CONFIRMATION:
         return ["confirm", "roll-back"]
-    return [] if state is RestoreState.ROLLING_BACK else ["roll-back"]
+    on_its_way = not state.ended and state not in (RestoreState.ROLLING_BACK, RestoreState.INCOMPLETE)
+    return ["roll-back"] if on_its_way else []
 
 
 def _values(kept: Kept, descriptions: Descriptions) -> list[RestoreValue]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import AsyncIterator, Iterator, Mapping
+from collections.abc import AsyncIterator, Callable, Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -112,6 +112,13 @@ class Bench:
         desk = Desk(self.office, self.connection.journal, self.connection.stamper, timing or QUICK, data=self.data)
         self.connection.gate.blocks = desk.blocks
         return desk
+
+    async def hold_store(self) -> Callable[[], None]:
+        """Have another process hold the store's file, so that nothing can be written; gives what ends it."""
+        await self.office.store.run(lambda kept: kept.exec_driver_sql("PRAGMA busy_timeout = 20"))
+        held = sqlite3.connect(self.data / "store.sqlite3", isolation_level=None)
+        held.execute("BEGIN IMMEDIATE")
+        return held.close
 
     def intent_on_disk(self, mux: bytes) -> bool:
         """Whether another reader of the store finds an open intent for the object."""

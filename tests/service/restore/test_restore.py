@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -21,8 +22,9 @@ from app.twins.line import Fault, drop
 from app.twins.object_store import RefusedAccessError
 from app.wire.frame import Can
 from app.wire.sdo import Abort
-from tests.service.conftest import Served
+from tests.service.conftest import MS, Served
 from tests.service.restore.conftest import CHANGES, PMC, PMM, QUICK, Bench
+from tests.web.rig import wait_until
 
 ACKNOWLEDGE = 0x60
 
@@ -295,9 +297,72 @@ async def test_a_plan_that_nobody_looked_at_is_not_begun(bench: Bench) -> None:
     assert bench.desk.open == ()
 
 
-async def test_one_at_a_time(bench: Bench) -> None:
-    restore_id = await bench.begin(confirm_s=30.0)
+async def test_one_at_a_time_whoever_asks_at_once(bench: Bench) -> None:
+    prepared = await bench.desk.prepare(bench.connection, await bench.order(confirm_s=30.0))
+    begun = await asyncio.gather(
+        *(bench.desk.begin(bench.connection, prepared, prepared.hash) for _ in range(2)), return_exceptions=True
+    )
+    assert [type(one) for one in begun] == [str, RestoreOpenError]
+    (row,) = await bench.desk.latest()
     with pytest.raises(RestoreOpenError):
         await bench.desk.prepare(bench.connection, await bench.order())
+    await bench.desk.close()
+    bench.desk = bench.another_desk()
+    ways = (bench.desk.resume, bench.desk.roll_back)
+    taken = await asyncio.gather(*(way(bench.connection, row.id, "Anna") for way in ways), return_exceptions=True)
+    assert taken[0] is None
+    assert await bench.desk.wait(row.id) in (End.NEW, End.OLD)
+    assert bench.desk.open == ()
+
+
+async def test_a_store_that_fails_stops_the_writing_at_once(bench: Bench) -> None:
+    """What cannot be journalled is not written: no way back is tried either, for it could not be journalled."""
+    restore_id = await bench.begin(confirm_s=30.0)
+    await bench.until_state(restore_id, RestoreState.AWAITING_CONFIRMATION)
+    blocker = await bench.hold_store()
+    await bench.desk.confirm(restore_id, "Anna")
+    assert await bench.desk.wait(restore_id) is End.INCOMPLETE
+    blocker()
+    assert [row.id for row in bench.desk.open] == [restore_id]
+    assert bench.stored(PMM, "3110:01") is None
+    with pytest.raises(RestoreOpenError):
+        target = bench.connection.target(PMM)
+        await save(bench.connection.driver(target), target, bench.connection.journal, bench.connection.stamper)
+    bench.desk = bench.another_desk()
+    await bench.desk.resume(bench.connection, restore_id, "Anna")
+    assert await bench.desk.wait(restore_id) is End.NEW
+
+
+async def test_a_slow_memory_is_waited_for_and_a_failing_one_ends_old(bench: Bench, served: Served) -> None:
+    before = await ram(bench)
+    memory = served.turbine.blades[0].pmm.device.memory
+    memory.failing = True
+    restore_id, end = await bench.run()
+    assert end is End.INCOMPLETE, "the old values could not be saved again either"
+    kept = await bench.desk.get(restore_id)
+    assert kept.outcome["first_cause"] == kept.outcome["cause"] == Cause.SAVE_FAILED.value
+    memory.failing, memory.slow_ns = False, 700 * MS
     await bench.desk.roll_back(bench.connection, restore_id, "Anna")
-    await bench.desk.wait(restore_id)
+    assert await bench.desk.wait(restore_id) is End.OLD
+    assert await ram(bench) == before
+
+
+async def test_late_acknowledges_do_not_lead_astray(bench: Bench, served: Served) -> None:
+    """Every answer of the PMM comes 700 ms late, longer than is waited for."""
+    instructor = Instructor(served.turbine, served.line)
+    restore_id = await bench.begin({PMM: {"3110:01": 490, "30FC:02": 655}}, confirm_s=30.0)
+    order = FaultOrder("late_sdo_ack", node=1, values={"delay_ms": 700.0}, seconds=1.5)
+    served.thread.call_soon(lambda: _inject(instructor, order))
+    transaction = bench.desk.at_work(restore_id)
+    assert transaction is not None
+    await wait_until(lambda: transaction.state in (RestoreState.AWAITING_CONFIRMATION, RestoreState.ROLLED_BACK))
+    if transaction.state is RestoreState.AWAITING_CONFIRMATION:
+        await bench.desk.confirm(restore_id, "Anna")
+    end = await bench.desk.wait(restore_id)
+    assert end in (End.NEW, End.OLD)
+    assert await bench.ram(PMM, "3110:01") == (490 if end is End.NEW else 500)
+    assert await bench.ram(PMM, "30FC:02") == (655 if end is End.NEW else 650)
+
+
+def _inject(instructor: Instructor, order: FaultOrder) -> None:
+    instructor.inject(order)
