@@ -232,6 +232,15 @@ class Bench:
 
         return power
 
+    @asynccontextmanager
+    async def left_incomplete(self, cut: Cut) -> AsyncIterator[tuple[Tool, str]]:
+        """A tool whose restore was cut, and the id of that."""
+        async with tool(self._site, self._data, self.whole) as one:
+            with Trigger(self.station, cut.manner, cut.at, self._act_of(cut)):
+                assert await self._restored(one) is End.INCOMPLETE
+            await _connected(one.connection)
+            yield one, one.desk.open[0].id
+
     async def _restored(self, one: Tool) -> End:
         """A restore with its end. One that could not begin has changed nothing."""
         try:

@@ -56,11 +56,16 @@ class Snapshot:
 
 
 class Station:
-    """Twins of one blade in feather, quick to boot and to save. A context manager; methods are for any thread."""
+    """Twins of one blade, in feather where nothing else is said, quick to boot and to save.
 
-    def __init__(self, state: Path) -> None:
+    A context manager; methods are for any thread.
+    """
+
+    def __init__(self, state: Path, angle_deg: float = 90.0) -> None:
         self.line = CanLine(1_000_000)
-        settings = Settings(state_dir=state, turnaround_ns=MS // 20, boot_ns=10 * MS, save_ns=4 * MS, angle_deg=90.0)
+        settings = Settings(
+            state_dir=state, turnaround_ns=MS // 20, boot_ns=10 * MS, save_ns=4 * MS, angle_deg=angle_deg
+        )
         state.mkdir(parents=True, exist_ok=True)
         self._state = state
         self.blade = Blade(self.line, 1, load_builtin("oat-pmm"), load_builtin("oat-pmc"), settings)

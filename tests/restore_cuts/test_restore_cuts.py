@@ -18,7 +18,9 @@ from typing import Final
 
 import pytest
 
+from app.service.restore.order import Cause
 from app.service.restore.transaction import End
+from app.service.stop import Command, command_all
 from tests.restore_cuts.cuts import Bench, Cut, Kind, Result
 from tests.restore_cuts.station import Station
 from tests.restore_cuts.tool import hurry
@@ -26,6 +28,9 @@ from tests.restore_cuts.trigger import Manner
 
 SAMPLE: Final = 60
 SEED: Final = 1010
+ON_THE_WAY_DEG: Final = 84.0
+IN_THE_MIDST: Final = 30
+"""SDOs behind the first write, of which there are some seventy."""
 NEVER: Final = 1 << 40
 BEFORE_BEGIN: Final = 5
 """Cuts before the restore begins: it only reads then."""
@@ -82,6 +87,29 @@ async def test_sixty_cuts(bench: Bench, capsys: pytest.CaptureFixture[str]) -> N
     ends = Counter((one.cut.kind, one.end) for one in results)
     for kind in Kind:
         assert ends[kind, End.INCOMPLETE] > 0, f"{kind.value}: no way out was taken"
+
+
+async def test_who_feathers_a_blade_that_is_left_incomplete_stops_it_before_a_way_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An axis that follows a command is not written to, and nothing but STOP may take the command back."""
+    hurry(monkeypatch.setattr)
+    with Station(tmp_path / "state", ON_THE_WAY_DEG) as station:
+        bench = Bench(station, tmp_path)
+        await bench.prepare()
+        cut = Cut(Kind.CABLE, Manner.PLAIN, await bench.sdos_before() + IN_THE_MIDST)
+        async with bench.left_incomplete(cut) as (one, restore_id):
+            axes, journal, stamper = one.connection.axes(), one.connection.journal, one.connection.stamper
+            (feathered,) = await command_all(axes, Command.FEATHER, journal, stamper)
+            assert feathered.confirmed_t_ns is not None
+            await one.desk.resume(one.connection, restore_id, "tester")
+            assert await one.desk.wait(restore_id) is End.INCOMPLETE
+            assert (await one.desk.get(restore_id)).outcome["cause"] == Cause.DRIVE_ENABLED.value
+            (stopped,) = await command_all(axes, Command.STOP, journal, stamper)
+            assert stopped.confirmed_t_ns is not None
+            await one.desk.resume(one.connection, restore_id, "tester")
+            assert await one.desk.wait(restore_id) is End.NEW
+            assert bench.truth() is End.NEW
 
 
 @pytest.mark.soak
