@@ -1,0 +1,94 @@
+"""``hubside sets``: the library on the command line, with its exit codes."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from app.cli.main import main
+from app.model.sets import dump_set
+from tests.model.set_rig import whole_set
+from tests.web.rig import ROOT
+
+VISIT = ROOT / "recordings" / "scenarios" / "7-service-visit.mcap"
+
+
+@dataclass
+class Sets:
+    """``hubside sets`` in a data folder of its own."""
+
+    data: Path
+    capsys: pytest.CaptureFixture[str]
+
+    def __call__(self, *words: object) -> tuple[int, str, str]:
+        code = main(["--data", str(self.data), "sets", *map(str, words)])
+        told = self.capsys.readouterr()
+        return code, told.out, told.err
+
+    def json(self, *words: object) -> Any:
+        code, out, err = self(*words, "--json")
+        assert code == 0, err
+        lines = out.splitlines()
+        return json.loads(lines[0]) if len(lines) == 1 else [json.loads(line) for line in lines]
+
+
+@pytest.fixture
+def sets(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Sets:
+    monkeypatch.setenv("HUBSIDE_LANGUAGE", "en")
+    return Sets(tmp_path / "data", capsys)
+
+
+@pytest.mark.parametrize("kind", ["json", "dcf", "csv"])
+def test_a_set_goes_out_and_comes_in_as_the_same(sets: Sets, tmp_path: Path, kind: str) -> None:
+    source = tmp_path / "in.json"
+    source.write_text(dump_set(whole_set("oat-pmc")))
+    first = sets.json("import", source)
+    target = tmp_path / f"out.{kind}"
+    assert sets("export", first["id"], "--format", kind, "--output", target)[0] == 0
+    assert sets("export", first["id"], "--format", kind, "--output", target)[0] == 2, "a file is never replaced"
+    assert sets.json("import", target)["id"] == first["id"]
+    assert len(sets.json("list")) == 1
+    assert json.loads(sets("show", first["id"], "--json")[1])["hash"] == f"sha256:{first['hash']}"
+
+
+def test_one_bad_file_and_none_is_taken(sets: Sets, tmp_path: Path) -> None:
+    good, bad = tmp_path / "good.json", tmp_path / "bad.csv"
+    good.write_text(dump_set(whole_set("oat-pmc")))
+    bad.write_text("address,raw\n6065,many\n")
+    code, _out, err = sets("import", good, bad)
+    assert code == 2
+    assert "bad.csv, line 2: 'many' is no raw value" in err
+    assert sets.json("list") == []
+    bad.write_text("address,raw\n6065,1\n2FFF,1\n")
+    code, _out, err = sets("import", bad, "--device", "wtg-07/blade-1/pmc")
+    assert code == 0
+    assert "2FFF" in err and "line 3" in err
+    assert sets("import", bad, "--device", "pmc")[0] == 2
+
+
+def test_tags_and_nameplates_and_what_is_refused(sets: Sets, tmp_path: Path) -> None:
+    source = tmp_path / "in.json"
+    source.write_text(dump_set(whole_set("oat-pmc")))
+    key = sets.json("import", source)["id"]
+    assert sets.json("tag", key, "golden")["tags"] == ["golden"]
+    assert [one["id"] for one in sets.json("list", "--tag", "golden")] == [key]
+    assert sets.json("tag", key, "golden", "--off")["tags"] == []
+    assert sets("tag", "00000000", "golden")[0] == 3
+    assert sets("nameplate", "wtg-07/blade-1/pmc", "P1", "P2")[0] == 3
+    assert sets("nameplate", "wtg-07/blade-1/pmc", "P1")[0] == 2
+    assert sets.json("nameplate", "wtg-07/blade-1/pmc", "P1", "P1")["serial"] == "P1"
+    assert sets.json("nameplate", "wtg-07/blade-1/pmc")["serial"] == "P1"
+
+
+def test_sets_come_out_of_a_recording_with_the_instant_and_direction_of_each_value(sets: Sets) -> None:
+    found = {one["device"]: one for one in sets.json("recover", VISIT)}
+    assert len(found) == 6
+    seen = found["wtg-07/blade-2/pmc"]["seen"]
+    assert {one["access"] for one in seen.values()} == {"read", "write"}
+    assert len(sets.json("list")) == 6
+    assert sets("recover", VISIT.with_name("none.mcap"))[0] == 2
+    assert sets("recover", VISIT, "--node", "12=nobody")[0] == 2
