@@ -110,6 +110,7 @@ async def test_the_html_file_needs_nothing_else(server: Server) -> None:
     assert "50.0 °C" in page
     assert "49.0 °C" in page
     assert "TWIN" in page
+    assert page.count("bit 0: X13.10, feather command (EFC)</th>") == 1, "a clamp is told once"
     assert not re.findall(r"<(?:script|link|img|iframe)|src=|href=|url\(", page)
     assert "default-src 'none'" in page
     assert "2 verschieden, " in await exported(server, "html", "de")

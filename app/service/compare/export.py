@@ -23,7 +23,8 @@ body { margin: 0 auto; padding: 8mm; background: #fff; color: #16202b;
   font: 9pt/1.35 system-ui, "Segoe UI", "DejaVu Sans", sans-serif; }
 h1 { font-size: 16pt; margin: 0; } h2 { font-size: 11pt; margin: 5mm 0 1.5mm; break-after: avoid; }
 p.sum { border-left: 2mm solid #2a5d9c; padding: 2mm 3mm; font-size: 11pt; font-weight: 700; background: #f3f5f7; }
-table { width: 100%; border-collapse: collapse; }
+table { width: 100%; border-collapse: collapse; table-layout: fixed; }
+col.name { width: 26%; } col.state { width: 11%; }
 th, td { text-align: left; vertical-align: top; padding: .7mm 1.2mm; border-bottom: .2mm solid #c9d1d8;
   overflow-wrap: anywhere; font-variant-numeric: tabular-nums; }
 thead th { border-bottom: .4mm solid #16202b; } thead small { display: block; font-weight: 400; }
@@ -74,6 +75,7 @@ def _group(title: str, rows: list[Row], compared: Compared, words: Words) -> str
     return f"""<section>
 <h2>{escape(title)}</h2>
 <table>
+<colgroup><col class="name"><col class="state"></colgroup>
 <thead><tr><th scope="col">{escape(parameter)}</th><th scope="col">{escape(state)}</th>{head}</tr></thead>
 <tbody>
 {body}

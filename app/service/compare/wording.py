@@ -67,9 +67,9 @@ class Words:
         return self.texts(f"page.compare.row.{row.state.value}")
 
     def restore(self, row: Row) -> str:
-        """The class, where it is worth a word."""
+        """The class, where it is worth a word that the state does not say already."""
         word = row.entry.restore.value
-        return "" if word == "copy" else self.texts(f"page.compare.class.{word}")
+        return "" if word == "copy" or row.state is RowState.UNIT else self.texts(f"page.compare.class.{word}")
 
     def name(self, row: Row) -> str:
         """What the parameter is called."""
@@ -85,7 +85,7 @@ class Words:
         """A bit with its clamp."""
         number = str(bit.bit) if bit.bit == bit.last else f"{bit.bit}..{bit.last}"
         name = self.texts("page.compare.bit_unnamed") if bit.text_key is None else self.texts(bit.text_key)
-        clamp = f" ({bit.clamp})" if bit.clamp else ""
+        clamp = f" ({bit.clamp})" if bit.clamp and bit.clamp not in name else ""
         return f"{self.texts('page.compare.bit', bit=number)}: {name}{clamp}"
 
     def bit_value(self, bit: BitRow, number: int | None) -> str:
