@@ -233,13 +233,12 @@ class Bench:
         return power
 
     @asynccontextmanager
-    async def left_incomplete(self, cut: Cut) -> AsyncIterator[tuple[Tool, str]]:
-        """A tool whose restore was cut, and the id of that."""
+    async def left_incomplete(self, at: int) -> AsyncIterator[tuple[Tool, str]]:
+        """A tool that takes up a restore whose own was killed at an SDO, and the id of that."""
+        await self._kill(Cut(Kind.PROCESS, Manner.PLAIN, at))
         async with tool(self._site, self._data, self.whole) as one:
-            with Trigger(self.station, cut.manner, cut.at, self._act_of(cut)):
-                assert await self._restored(one) is End.INCOMPLETE
-            await _connected(one.connection)
-            yield one, one.desk.open[0].id
+            (row,) = one.desk.open
+            yield one, row.id
 
     async def _restored(self, one: Tool) -> End:
         """A restore with its end. One that could not begin has changed nothing."""
@@ -252,6 +251,14 @@ class Bench:
 
     async def _killed(self, cut: Cut) -> Result:
         """The process of the tool is killed, and another one takes up what it left."""
+        count = await self._kill(cut)
+        async with tool(self._site, self._data, self.whole) as one:
+            end = await self._claimed(one.desk)
+            await self._judged(one, end, cut)
+        return Result(cut, count >= cut.at, end, count)
+
+    async def _kill(self, cut: Cut) -> int:
+        """Have a process restore, and kill it; gives how many SDOs there were."""
         if self._zygote is None:
             self._zygote = Zygote()
         job = {"site": str(self._site), "data": str(self._data), "whole": self.whole}
@@ -265,10 +272,7 @@ class Bench:
             pids.append(self._zygote.start({**job, "sets": [str(path) for path in self._sets]}))
             await asyncio.to_thread(self._zygote.wait)
             await self._alive()
-        async with tool(self._site, self._data, self.whole) as one:
-            end = await self._claimed(one.desk)
-            await self._judged(one, end, cut)
-        return Result(cut, trigger.count >= cut.at, end, trigger.count)
+        return trigger.count
 
     async def _alive(self) -> None:
         """The devices have power, and have finished what they did; an axis that feathered stands."""

@@ -28,6 +28,7 @@ from tests.restore_cuts.trigger import Manner
 
 SAMPLE: Final = 60
 SEED: Final = 1010
+FEATHERED_DEG: Final = 90.0
 ON_THE_WAY_DEG: Final = 84.0
 IN_THE_MIDST: Final = 30
 """SDOs behind the first write, of which there are some seventy."""
@@ -54,9 +55,11 @@ async def whole_bench(monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Bench]:
 
 
 @asynccontextmanager
-async def _benched(monkeypatch: pytest.MonkeyPatch, whole: bool) -> AsyncIterator[Bench]:
+async def _benched(
+    monkeypatch: pytest.MonkeyPatch, whole: bool, angle_deg: float = FEATHERED_DEG
+) -> AsyncIterator[Bench]:
     hurry(monkeypatch.setattr)
-    with TemporaryDirectory(dir=_folder_in_memory()) as folder, Station(Path(folder) / "state") as station:
+    with TemporaryDirectory(dir=_folder_in_memory()) as folder, Station(Path(folder) / "state", angle_deg) as station:
         one = Bench(station, Path(folder), whole)
         await one.prepare()
         try:
@@ -90,15 +93,12 @@ async def test_sixty_cuts(bench: Bench, capsys: pytest.CaptureFixture[str]) -> N
 
 
 async def test_who_feathers_a_blade_that_is_left_incomplete_stops_it_before_a_way_out(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """An axis that follows a command is not written to, and nothing but STOP may take the command back."""
-    hurry(monkeypatch.setattr)
-    with Station(tmp_path / "state", ON_THE_WAY_DEG) as station:
-        bench = Bench(station, tmp_path)
-        await bench.prepare()
-        cut = Cut(Kind.CABLE, Manner.PLAIN, await bench.sdos_before() + IN_THE_MIDST)
-        async with bench.left_incomplete(cut) as (one, restore_id):
+    async with _benched(monkeypatch, whole=False, angle_deg=ON_THE_WAY_DEG) as bench:
+        at = await bench.sdos_before() + IN_THE_MIDST
+        async with bench.left_incomplete(at) as (one, restore_id):
             axes, journal, stamper = one.connection.axes(), one.connection.journal, one.connection.stamper
             (feathered,) = await command_all(axes, Command.FEATHER, journal, stamper)
             assert feathered.confirmed_t_ns is not None
