@@ -40,6 +40,7 @@ ROUTES: Final[dict[tuple[str, str], Role]] = {
     ("GET", "/api/live/visit"): VIEWER,
     ("PATCH", "/api/live/visit"): TECHNICIAN,
     ("POST", "/api/live/visit/end"): TECHNICIAN,
+    ("GET", "/api/live/visit/left"): VIEWER,
     ("GET", "/api/live/changes-since-last-visit"): VIEWER,
     ("GET", "/api/favourites/{description_id}"): VIEWER,
     ("PUT", "/api/favourites/{description_id}"): VIEWER,

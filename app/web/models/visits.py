@@ -180,3 +180,12 @@ class Favourites(BaseModel):
     model_config = ConfigDict(extra="forbid")
 
     addresses: Annotated[list[Annotated[str, Field(max_length=20)]], Field(max_length=500)]
+
+
+class LeftNow(BaseModel):
+    """How much of a device's parameters is known now: what was not read, or is stale, would not be kept as left."""
+
+    device: str
+    parameters: int
+    unread: int
+    stale: int

@@ -9,12 +9,14 @@ from fastapi import APIRouter, Query
 from app.model.address import parse_address
 from app.model.roles import Role
 from app.service.office.last_change import history, last_changes
-from app.service.office.visit_changes import changes_since_last_visit
+from app.service.office.visit_changes import changes_since_last_visit, is_parameter
+from app.service.office.visits import STALE, as_known
 from app.store import small_rows
 from app.web.deps import DEVICE, BenchOf, ConnectionOf, PersonOf, TargetOf, needs
 from app.web.models.visits import (
     ChangesSinceLastVisit,
     Favourites,
+    LeftNow,
     ParameterChange,
     ParameterChanges,
     PresentVisit,
@@ -45,6 +47,20 @@ async def change_visit(bench: BenchOf, person: PersonOf, given: VisitChange) -> 
 async def end_visit(bench: BenchOf, person: PersonOf, given: VisitEnd) -> VisitDoc:
     """Keep the values as left, end the visit, and disconnect."""
     return VisitDoc.of(await bench.end_visit(given.reason, given.work_order, person.person))
+
+
+@router.get("/live/visit/left")
+async def left_now(bench: BenchOf, connection: ConnectionOf) -> list[LeftNow]:
+    """What would be kept of each device as left, were the visit ended now. Nothing is read for it."""
+    turbine, person = connection.turbine.slug, bench.options.person
+    found = []
+    for target in connection.targets:
+        known = as_known(target, turbine, person, bench.stamper())
+        parameters = [entry.address for entry in target.description if is_parameter(entry)]
+        reasons = [known.unread[address] for address in parameters if address in known.unread]
+        stale = reasons.count(STALE)
+        found.append(LeftNow(device=target.slug, parameters=len(parameters), unread=len(reasons) - stale, stale=stale))
+    return found
 
 
 @router.get("/visits")

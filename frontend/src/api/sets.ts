@@ -8,6 +8,7 @@ type Schemas = components["schemas"];
 export type Nameplate = Schemas["NameplateDoc"];
 export type SetTaken = Schemas["SetTaken"];
 export type Recovered = Schemas["RecoveredSets"];
+export type LeftNow = Schemas["LeftNow"];
 export type TagName = Schemas["TagChange"]["tag"];
 export type SetImport = Schemas["SetImport"];
 export type SetFormat = "json" | "dcf" | "csv";
@@ -44,6 +45,13 @@ export const knownDescriptionQuery = (id: string) =>
 export const nameplatesQuery = queryOptions({
   queryKey: ["nameplates"],
   queryFn: ({ signal }) => get<Nameplate[]>("/api/nameplates", signal),
+});
+
+/** What would be kept of each device as left, were the visit ended now. */
+export const leftQuery = queryOptions({
+  queryKey: ["visit", "left"],
+  queryFn: ({ signal }) => get<LeftNow[]>("/api/live/visit/left", signal),
+  staleTime: 0,
 });
 
 export const setDownload = (id: string, format: SetFormat) => `/api/sets/${id}/download?format=${format}`;

@@ -3,6 +3,7 @@ import { IconDoorExit } from "@tabler/icons-react";
 import { useMutation, useQuery } from "@tanstack/react-query";
 import { useState } from "react";
 import { queryClient, turbineQuery } from "../api/queries";
+import { AsLeft } from "./AsLeft";
 import { connecting, knownTurbinesQuery, visitQuery, type Visit } from "../api/settings";
 import { useTexts } from "../texts/texts";
 import { notify } from "../ui/notices";
@@ -73,6 +74,7 @@ function Form({ visit, onClose }: { visit: Visit; onClose: () => void }) {
         onChange={(event) => setOrder(event.currentTarget.value)}
         data-testid="visit-order"
       />
+      <AsLeft />
       {error !== null && <ProblemAlert error={error} title={t("page.visit.not_ended")} />}
       <Group justify="flex-end">
         <Button variant="default" disabled={busy} onClick={() => keeping.mutate()}>
