@@ -8,7 +8,6 @@ import contextlib
 import signal
 import sys
 import threading
-from collections import Counter
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -17,23 +16,19 @@ from typing import Any, Final
 from app.cli.arguments import seconds
 from app.cli.connecting import connected, run_command
 from app.cli.output import Output
+from app.cli.restore_plan import tell_plan
 from app.cli.targets import add_connection
 from app.errors import RestoreRefusedError, RestoreStateError, SetFileError, UsageError
 from app.model.address import parse_address
-from app.model.datatypes import Raw
-from app.model.restore.plan import PlanRow, StepKind, Treatment
 from app.model.sets import ParameterSet, load_set
 from app.model.station import Place
-from app.model.values import quantity_of, show
 from app.service.connection import Connection
 from app.service.gate import BARE_TURBINE
 from app.service.office.office import Office
 from app.service.restore.assign import assign
 from app.service.restore.desk import Desk
-from app.service.restore.details import plain
 from app.service.restore.motor_given import given_motor, is_motor
 from app.service.restore.order import Given, Order
-from app.service.restore.prepare import Prepared
 from app.service.restore.survey import targets_of
 from app.service.restore.transaction import End
 from app.store.restore_rows import RestoreRow, RestoreState, list_restores
@@ -166,7 +161,7 @@ async def _restore(arguments: argparse.Namespace, output: Output) -> int:
             order,
             lambda done, total: output.progress("cli.reading", device=order.station, done=done, total=total),
         )
-        _tell_plan(prepared, output)
+        tell_plan(prepared, output)
         if arguments.plan:
             return RestoreRefusedError.exit_code if prepared.refusals else 0
         restore_id = await desk.begin(connection, prepared, prepared.hash)
@@ -270,69 +265,6 @@ def _selected(text: str | None, station: str, given: dict[str, Given]) -> frozen
 
 
 # -- what is told --------------------------------------------------------------------
-
-
-def _tell_plan(prepared: Prepared, output: Output) -> None:
-    plan = prepared.plan
-    writes = [row for row in plan.rows if row.treatment is Treatment.WRITE]
-    if output.as_json:
-        output.result(_plan_dict(prepared), "")
-        return
-    head = ("DEVICE", "ADDRESS", "NAME", "NOW", "WANTED", "UNIT")
-    output.table(head, [_row(prepared, row, output) for row in writes])
-    counts = Counter(row.why for row in plan.rows if row.why is not None and row.wanted is not None)
-    output.say(
-        "cli.restore_plan",
-        station=prepared.order.station,
-        writes=len(writes),
-        equal=sum(row.treatment is Treatment.EQUAL for row in plan.rows),
-        skipped=sum(counts.values()),
-    )
-    for why, count in counts.items():
-        output.say("cli.restore_skipped", count=count, why_key=f"restore.why.{why.value}")
-    saves = [step.device for step in plan.steps if step.kind is StepKind.SAVE]
-    restarts = [step.device for step in plan.steps if step.kind is StepKind.RESTART]
-    output.say("cli.restore_then", saves=", ".join(saves) or "–", restarts=", ".join(restarts) or "–")
-    for refusal in prepared.refusals:
-        text = output.texts(refusal.objection.text_key, **refusal.details)
-        output.say("cli.restore_refusal", device=refusal.device or prepared.order.station, text=text)
-
-
-def _plan_dict(prepared: Prepared) -> dict[str, Any]:
-    rows = [row for row in prepared.plan.rows if row.treatment is not Treatment.EQUAL]
-    return {
-        "station": prepared.order.station,
-        "plan": prepared.hash,
-        "rows": [
-            {
-                "device": row.place.slug,
-                "address": row.place.address.short,
-                "treatment": row.treatment.value,
-                "why": None if row.why is None else row.why.value,
-                "now": plain(row.now),
-                "wanted": plain(row.wanted),
-            }
-            for row in rows
-        ],
-        "steps": [
-            {"kind": step.kind.value, "device": step.device, "address": step.place and step.place.address.short}
-            for step in prepared.plan.steps
-        ],
-        "refusals": [refusal.as_detail() for refusal in prepared.refusals],
-    }
-
-
-def _row(prepared: Prepared, row: PlanRow, output: Output) -> tuple[str, ...]:
-    device = prepared.found.station.device(row.place.slug)
-    assert device is not None  # the plan was made of this station
-    entry, lookup = device.description.entry(row.place.address), device.values.get
-
-    def shown(raw: Raw | None) -> str:
-        return "–" if raw is None else show(entry, raw, lookup)
-
-    short = row.place.slug.rpartition("/")[2]
-    name, unit = output.texts.name(entry.title), quantity_of(entry, lookup).unit
-    return short, row.place.address.short, name, shown(row.now), shown(row.wanted), unit
 
 
 async def _follow(arguments: argparse.Namespace, output: Output, desk: Desk, restore_id: str, wanted: End) -> int:
