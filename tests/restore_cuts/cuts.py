@@ -10,7 +10,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
-from contextlib import asynccontextmanager, suppress
+from contextlib import AsyncExitStack, asynccontextmanager, suppress
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
@@ -26,8 +26,6 @@ from app.model.restore.plan import Treatment
 from app.model.sets import dump_set
 from app.model.station import Place
 from app.service.connection import Connection
-from app.service.journal import Journal
-from app.service.office.office import Office
 from app.service.records.check import Verdict, check_file
 from app.service.restore.desk import Desk
 from app.service.restore.order import Cause
@@ -38,9 +36,8 @@ from app.service.stop import Path as Sent
 from app.service.write import write_raw
 from app.store.database import FILE
 from app.store.restore_rows import RestoreState
-from app.store.store import Store
 from tests.restore_cuts.station import PMC, PMM, STATION, Snapshot, Station
-from tests.restore_cuts.tool import TIMING, Tool, changed, order, tool
+from tests.restore_cuts.tool import Tool, changed, connected, order, tool, tool_on
 from tests.restore_cuts.trigger import Manner, Trigger
 from tests.web.rig import wait_until
 
@@ -143,6 +140,8 @@ class Bench:
         self._copy = folder / "copy"
         self._empty = folder / "empty"
         self._before: Snapshot | None = None
+        self._lines = AsyncExitStack()
+        self._line: Connection | None = None
 
     async def prepare(self) -> None:
         """Write the files, and take down what the station holds before."""
@@ -170,10 +169,23 @@ class Bench:
                 await one.desk.prepare(one.connection, order(self._sets))
             return trigger.count
 
-    def close(self) -> None:
-        """End the processes."""
+    async def close(self) -> None:
+        """End connections and processes."""
+        await self._hang_up()
         if self._zygote is not None:
             self._zygote.close()
+
+    async def _connection(self) -> Connection:
+        """The one that all cuts share after which the tool lives on: it takes longer to make than a restore."""
+        if self._line is None:
+            made = connected(self._site, self._folder / "recordings", self.whole)
+            self._line = await self._lines.enter_async_context(made)
+        await _connected(self._line)
+        return self._line
+
+    async def _hang_up(self) -> None:
+        await self._lines.aclose()
+        self._line = None
 
     # -- the truth -----------------------------------------------------------------------
 
@@ -212,7 +224,7 @@ class Bench:
 
     async def _cut_off(self, cut: Cut) -> Result:
         """Power or cable: the tool lives on."""
-        async with tool(self._site, self._data, self.whole) as one:
+        async with tool_on(await self._connection(), self._data) as one:
             with Trigger(self.station, cut.manner, cut.at, self._act_of(cut)) as trigger:
                 end = await self._restored(one)
             await self._alive()
@@ -259,6 +271,7 @@ class Bench:
 
     async def _kill(self, cut: Cut) -> int:
         """Have a process restore, and kill it; gives how many SDOs there were."""
+        await self._hang_up()  # a second client would pass for another master
         if self._zygote is None:
             self._zygote = Zygote()
         job = {"site": str(self._site), "data": str(self._data), "whole": self.whole}
@@ -297,20 +310,20 @@ class Bench:
         await _is_shut(one.connection)
         left = self.station.snapshot()
         await one.office.store.back_up(self._copy / FILE)
-        await self._gone(one, one.desk, row.id, one.desk.resume, End.NEW, cut)
+        await self._gone(one, row.id, one.desk.resume, End.NEW, cut)
         self.station.settle()
         self.station.put_back(left)
-        async with _another_desk(one, self._copy) as desk:
-            await self._gone(one, desk, row.id, desk.roll_back, End.OLD, cut)
+        async with tool_on(one.connection, self._copy) as other:  # as another run finds it
+            await self._gone(other, row.id, other.desk.roll_back, End.OLD, cut)
 
-    async def _gone(self, one: Tool, desk: Desk, restore_id: str, way: Way, goal: End, cut: Cut) -> None:
+    async def _gone(self, one: Tool, restore_id: str, way: Way, goal: End, cut: Cut) -> None:
         """One way out, to its end. Where this computer was too busy to answer in time, the way is still open."""
         for _ in range(ATTEMPTS):
             await way(one.connection, restore_id, "tester")
-            if await desk.wait(restore_id) is goal:
+            if await one.desk.wait(restore_id) is goal:
                 self._holds(goal, cut)
-                return await _is_recorded(desk, restore_id, goal)
-            outcome = (await desk.get(restore_id)).outcome
+                return await _is_recorded(one.desk, restore_id, goal)
+            outcome = (await one.desk.get(restore_id)).outcome
             del outcome["events"]
             assert outcome["cause"] == Cause.NO_ANSWER.value, f"{cut}: to {goal.value}, {outcome}"
         raise AssertionError(f"{cut}: to {goal.value}, {ATTEMPTS} times without an answer")
@@ -350,19 +363,6 @@ async def _is_shut(connection: Connection) -> None:
             await write_raw(connection.driver(target), target, parse_address(address), 120, connection.journal)
     (stopped,) = await command_all(connection.axes(), Command.STOP, connection.journal, connection.stamper)
     assert stopped.how is not Sent.FAILED, stopped.error
-
-
-@asynccontextmanager
-async def _another_desk(one: Tool, data: Path) -> AsyncIterator[Desk]:
-    """The desk of another run, on a copy of the store as the cut left it."""
-    journal = Journal(one.connection.stamper, "tester")
-    office = Office(Store.open(data), journal, one.connection.stamper, "tester")
-    desk = Desk(office, journal, one.connection.stamper, TIMING, data=data)
-    try:
-        yield desk
-    finally:
-        await desk.close()
-        await office.close()
 
 
 def _short(values: Mapping[Place, Raw]) -> dict[str, Raw]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import AsyncIterator, Callable, Iterable, Mapping
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, replace
@@ -19,13 +18,11 @@ from app.model.description_file import load_builtin
 from app.model.sets import ParameterSet, load_set
 from app.model.site import load_site
 from app.service.connection import Connection
-from app.service.journal import Journal
 from app.service.office.office import Office
 from app.service.options import Options
 from app.service.restore.desk import Desk
 from app.service.restore.order import Given, Order, Timing
 from app.store.store import Store
-from app.wire.frame import Stamper
 from tests.restore_cuts.station import STATION
 
 TIMEOUT_S: Final = 0.15
@@ -78,23 +75,35 @@ def _is_kept(description_id: str, entry: Entry) -> bool:
 
 
 @asynccontextmanager
-async def tool(site: Path, data: Path, whole: bool = False) -> AsyncIterator[Tool]:
-    """From its start to its end, connected and recording."""
+async def connected(site: Path, recordings: Path, whole: bool = False) -> AsyncIterator[Connection]:
+    """A connection that records."""
     (turbine,) = load_site(site)
-    stamper = Stamper(time.time_ns(), time.monotonic_ns)
-    journal = Journal(stamper, "tester")
-    office = Office(Store.open(data), journal, stamper, "tester")
-    desk = Desk(office, journal, stamper, TIMING, data=data)
-    options = Options("tester", data / "recordings", listen_s=0.0)
-    connection = Connection(turbine, descriptions(whole), options, stamper=stamper, journal=journal)
-    connection.gate.blocks = desk.blocks
+    connection = Connection(turbine, descriptions(whole), Options("tester", recordings, listen_s=0.0))
     try:
         await connection.open()
+        yield connection
+    finally:
+        await connection.close()
+
+
+@asynccontextmanager
+async def tool_on(connection: Connection, data: Path) -> AsyncIterator[Tool]:
+    """A store with its desk, on a connection that is there."""
+    office = Office(Store.open(data), connection.journal, connection.stamper, "tester")
+    desk = Desk(office, connection.journal, connection.stamper, TIMING, data=data)
+    connection.gate.blocks = desk.blocks
+    try:
         yield Tool(office, desk, connection)
     finally:
         await desk.close()
-        await connection.close()
         await office.close()
+
+
+@asynccontextmanager
+async def tool(site: Path, data: Path, whole: bool = False) -> AsyncIterator[Tool]:
+    """From its start to its end."""
+    async with connected(site, data / "recordings", whole) as connection, tool_on(connection, data) as one:
+        yield one
 
 
 def order(sets: Iterable[Path]) -> Order:
