@@ -151,3 +151,16 @@ def test_a_nameplate_is_typed_twice(home: tuple[str, Page]) -> None:
     plate.get_by_test_id("plate-again").fill("P-20417")
     plate.get_by_test_id("plate-keep").click()
     expect(plate).to_contain_text("Serial number P-20417, typed by")
+
+
+def test_before_leaving_it_is_said_what_is_kept_and_then_it_is_there(home: tuple[str, Page]) -> None:
+    address, page = home
+    page.goto(f"{address}sets?scene=off&only=as-left")
+    page.get_by_test_id("connect-menu").click()
+    page.get_by_test_id("visit").click()
+    expect(page.get_by_test_id("as-left")).to_contain_text("of 6 devices go into the library")
+    if page.get_by_test_id("read-before-leaving").is_visible():
+        page.get_by_test_id("read-before-leaving").click()
+    expect(page.get_by_test_id("read-before-leaving")).to_have_count(0, timeout=WAIT_MS)
+    page.get_by_test_id("end-visit").click()
+    expect(rows(page).filter(has_text="as left")).to_have_count(6, timeout=WAIT_MS)
