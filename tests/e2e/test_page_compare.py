@@ -252,6 +252,19 @@ def test_a_fleet_is_ranked_against_a_chosen_set_and_leads_to_the_comparison(home
     expect(cell(page, "3110:01", 1)).to_contain_text("−2.0")
 
 
+def test_a_comparison_is_exported_in_the_language_of_the_page(home: Home) -> None:
+    page = home.page
+    home.go(f"tab=compare&lang=de&columns=live:{ONE},live:{TWO}")
+    page.get_by_test_id("compare-export").click()
+    with page.expect_download() as download:
+        page.get_by_test_id("export-csv").click()
+    text = Path(download.value.path()).read_text(encoding="utf-8")
+    assert download.value.suggested_filename == "hubside-comparison.csv"
+    assert "3110:01" in text
+    assert "51,0" in text
+    assert "30E1" not in text, "what matches is left out, as on the page"
+
+
 def test_parameters_lead_to_comparisons(home: Home) -> None:
     page = home.page
     page.goto(f"{home.address}parameters?scene=off&device={TWO}")

@@ -84,9 +84,9 @@ export function send<T>(method: "POST" | "PUT" | "PATCH", path: string, body: ob
   });
 }
 
-/** Sends JSON and gets a file. */
-export async function sendForFile(path: string, body: object): Promise<Blob> {
-  const headers = { "content-type": "application/json" };
+/** Sends JSON and gets a file, in the language of the page. */
+export async function sendForFile(path: string, body: object, language: string): Promise<Blob> {
+  const headers = { "content-type": "application/json", "accept-language": language };
   const answer = await answerOf(path, { method: "POST", headers, body: JSON.stringify(body) });
   return answer.blob();
 }

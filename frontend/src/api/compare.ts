@@ -2,7 +2,7 @@
 import { keepPreviousData, queryOptions } from "@tanstack/react-query";
 import { get, send, sendForFile } from "./client";
 import type { components } from "./generated";
-import type { DescriptionDoc, Raw } from "./types";
+import type { Language, Raw, SetList } from "./types";
 
 type Schemas = components["schemas"];
 
@@ -35,13 +35,19 @@ export const compareQuery = (columns: readonly string[], pending: Pending, live:
 
 export type ExportFormat = "html" | "csv";
 
+/** `same`: with the rows that match. */
 export const exportComparison = (
   format: ExportFormat,
   columns: readonly string[],
   pending: Pending,
-): Promise<Blob> => sendForFile(`/api/compare/export?format=${format}`, { columns, pending });
-
-export type SetRecord = Schemas["SetRecordDoc"];
+  same: boolean,
+  language: Language,
+): Promise<Blob> =>
+  sendForFile(
+    `/api/compare/export?format=${format}&same=${same ? "true" : "false"}`,
+    { columns, pending },
+    language,
+  );
 
 export const MOST_RECORDS = 2000;
 const FRESH_MS = 5000;
@@ -52,19 +58,7 @@ export const recordsQuery = (kind: string | null, limit: number = MOST_RECORDS) 
     queryKey: ["sets", "records", kind, limit],
     queryFn: async ({ signal }) => {
       const of = kind === null ? "" : `&description_id=${encodeURIComponent(kind)}`;
-      return (await get<Schemas["SetList"]>(`/api/sets?limit=${limit}${of}`, signal)).records;
+      return (await get<SetList>(`/api/sets?limit=${limit}${of}`, signal)).records;
     },
     staleTime: FRESH_MS,
   });
-
-/** What describes a kind of device, connected or not. */
-export const knownDescriptionQuery = (id: string) =>
-  queryOptions({
-    queryKey: ["known-description", id],
-    queryFn: ({ signal }) => get<DescriptionDoc>(`/api/descriptions/${encodeURIComponent(id)}`, signal),
-    enabled: id !== "",
-  });
-
-/** Takes a file into the library: `data` is base64; `device` and `kind` are for files that do not tell whose they are. */
-export const importSet = (name: string, data: string, device: string | null, kind: string | null) =>
-  send<Schemas["SetTaken"]>("POST", "/api/sets/import", { name, data, device, description_id: kind });

@@ -62,6 +62,8 @@ export function ColumnPicker({ columns, kind, onColumns }: Props) {
         </Combobox.Target>
         <Combobox.Dropdown>
           <Combobox.Search
+            role="combobox"
+            aria-expanded
             value={search}
             onChange={(event) => {
               setSearch(event.currentTarget.value);

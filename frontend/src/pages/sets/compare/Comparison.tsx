@@ -44,7 +44,7 @@ export function Comparison(props: Props) {
   const query = useQuery(compareQuery(columns, pending, hearing && columns.some(isLive)));
   const compared = useCompared(columns.length >= LEAST_COLUMNS ? query.data : undefined);
   const view = useView();
-  const exporting = useExport(columns, pending);
+  const exporting = useExport(columns, pending, view.rows);
   if (columns.length < LEAST_COLUMNS || query.isError)
     return (
       <div className={classes.room}>

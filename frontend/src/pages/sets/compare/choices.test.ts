@@ -1,5 +1,5 @@
 import { expect, it } from "vitest";
-import type { SetRecord } from "../../../api/compare";
+import type { SetRecord } from "../../../api/types";
 import { choice, deviceChoices, foundChoices, grouped, keptOf } from "./choices";
 import type { Source } from "./specs";
 

@@ -1,5 +1,5 @@
 /** What can stand in a column: the states of each connected device, and the sets of the library. */
-import type { SetRecord } from "../../../api/compare";
+import type { SetRecord } from "../../../api/types";
 import { ofDevice, Source } from "./specs";
 
 export interface Choice {

@@ -1,13 +1,8 @@
 /** Rows and columns of a comparison together with what the descriptions say of them. */
 import { useQueries } from "@tanstack/react-query";
 import { useMemo } from "react";
-import {
-  type CellDoc,
-  type ColumnDoc,
-  type ComparisonDoc,
-  knownDescriptionQuery,
-  type RowDoc,
-} from "../../../api/compare";
+import type { CellDoc, ColumnDoc, ComparisonDoc, RowDoc } from "../../../api/compare";
+import { knownDescriptionQuery } from "../../../api/sets";
 import type { DescriptionDoc, EntryDoc, Raw } from "../../../api/types";
 import { type ParameterRow, rowsOf } from "../../../model/rows";
 import type { DeviceContext } from "../../../model/shown";

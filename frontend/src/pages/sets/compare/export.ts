@@ -3,12 +3,17 @@ import { useTexts } from "../../../texts/texts";
 import { downloadBlob } from "../../../ui/export";
 import { notify } from "../../../ui/notices";
 import { storyOf } from "../../../ui/problem";
+import { Rows } from "./lines";
 
-/** The comparison as a file, made by the server: all rows, whatever is filtered here. */
-export function useExport(columns: readonly string[], pending: Pending): (format: ExportFormat) => void {
+/** The comparison as a file, made by the server: whatever is filtered here. */
+export function useExport(
+  columns: readonly string[],
+  pending: Pending,
+  rows: Rows,
+): (format: ExportFormat) => void {
   const t = useTexts();
   return (format) => {
-    exportComparison(format, columns, pending)
+    exportComparison(format, columns, pending, rows === Rows.All, t.language)
       .then((file) => downloadBlob(`hubside-comparison.${format}`, file))
       .catch((error: unknown) => {
         const story = storyOf(error, t);

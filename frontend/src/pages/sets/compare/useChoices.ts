@@ -1,7 +1,8 @@
 /** The choices of the picker, from the connected turbine and the library. */
 import { useQuery } from "@tanstack/react-query";
 import { useMemo } from "react";
-import { MOST_RECORDS, recordsQuery, type SetRecord } from "../../../api/compare";
+import { MOST_RECORDS, recordsQuery } from "../../../api/compare";
+import type { SetRecord } from "../../../api/types";
 import { turbineQuery } from "../../../api/queries";
 import { useServerNow } from "../../../live/live";
 import { type Translate, useTexts } from "../../../texts/texts";

@@ -1,4 +1,4 @@
-import { importSet } from "../../../api/compare";
+import { library } from "../../../api/sets";
 import { queryClient } from "../../../api/queries";
 import { useTexts } from "../../../texts/texts";
 import { notify } from "../../../ui/notices";
@@ -15,7 +15,14 @@ export function useUpload(
   return async (file) => {
     try {
       const device = reference === null ? null : deviceOf(reference);
-      const taken = await importSet(file.name, await base64Of(file), device, kind);
+      const taken = await library.importFile({
+        name: file.name,
+        data: await base64Of(file),
+        device,
+        description_id: kind,
+        as_values: false,
+        reason: "",
+      });
       void queryClient.invalidateQueries({ queryKey: ["sets"] });
       onColumn(ofDevice(Source.Set, taken.record.id));
     } catch (error) {

@@ -2,7 +2,7 @@ import { SegmentedControl } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { useMemo } from "react";
 import { fleetQuery } from "../../../api/fleet";
-import { knownDescriptionQuery } from "../../../api/compare";
+import { knownDescriptionQuery } from "../../../api/sets";
 import { usePageSearch } from "../../../frame/search";
 import { useTexts } from "../../../texts/texts";
 import { ProblemAlert } from "../../../ui/ProblemAlert";
@@ -32,7 +32,7 @@ export function FleetTab() {
   const view = Object.values(View).find((one) => one === search.rows) ?? View.Ranking;
   const group = view === View.Map ? (search.group ?? null) : null;
   const query = useQuery(fleetQuery(kind, record, group));
-  const description = useQuery(knownDescriptionQuery(kind)).data;
+  const description = useQuery({ ...knownDescriptionQuery(kind), enabled: kind !== "" }).data;
   const names = useMemo(() => fleetNames(description, t), [description, t]);
   const doc = kind === "" ? undefined : query.data;
   return (
