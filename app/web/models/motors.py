@@ -54,8 +54,11 @@ class PlateDoc(BaseModel):
 
     def plate(self) -> Plate:
         """As the model has it."""
-        found = self.model_dump()
-        return Plate(**{name: Decimal(str(one)) if isinstance(one, float) else one for name, one in found.items()})
+        found: dict[str, Any] = self.model_dump()
+        exact: dict[str, Any] = {
+            name: Decimal(str(one)) if isinstance(one, float) else one for name, one in found.items()
+        }
+        return Plate(**exact)
 
 
 class PlateFieldDoc(BaseModel):
