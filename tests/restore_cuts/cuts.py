@@ -65,11 +65,12 @@ _ENDED: Final = {RestoreState.DONE: End.NEW, RestoreState.ROLLED_BACK: End.OLD}
 
 
 class Kind(Enum):
-    """What is cut."""
+    """What is cut. ``ANSWER``: nothing but a single answer, which comes when nobody waits for it any more."""
 
     POWER = "power"
     PROCESS = "process"
     CABLE = "cable"
+    ANSWER = "answer"
 
 
 @dataclass(frozen=True, slots=True)
@@ -236,6 +237,8 @@ class Bench:
         station = self.station
         if cut.kind is Kind.CABLE:
             return station.pull_cable
+        if cut.kind is Kind.ANSWER:
+            return lambda: None
 
         def power() -> None:
             station.cut_power()

@@ -12,6 +12,8 @@ from app.wire.sdo import REQUEST_BASE, RESPONSE_BASE
 from tests.restore_cuts.station import MS, NODES, Station
 
 LATE_NS: Final = 20 * MS
+TOO_LATE_NS: Final = 400 * MS
+"""After every time-out of the tool, while it does something else."""
 SLOW_NS: Final = 60 * MS
 _WRITTEN: Final = 0x60
 """First byte of the acknowledge of a write (CiA 301, 7.2.4.3.3)."""
@@ -23,8 +25,8 @@ class Manner(Enum):
     """How the devices answer, and at which instant of an SDO the cut comes.
 
     ``PLAIN``: at once; after the answer was handed over. ``SLOW``: the memory takes long; after the request arrived, so
-    that a save is cut in its midst. ``LATE``: acknowledges of writes come late; after it was executed, the answer
-    still on its way.
+    that a save is cut in its midst. ``LATE``: acknowledges of writes come late; after it was executed, its answer
+    still on its way for longer than the tool waits.
     """
 
     PLAIN = "plain"
@@ -56,7 +58,7 @@ class Trigger(Interference):
         struck = self._step()
         if not struck and can.data[0] != _WRITTEN:
             return False
-        port.put(can, ready_ns + LATE_NS)
+        port.put(can, ready_ns + (TOO_LATE_NS if struck else LATE_NS))
         return True
 
     def _begin(self) -> None:
