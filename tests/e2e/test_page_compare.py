@@ -261,7 +261,7 @@ def test_a_comparison_is_exported_in_the_language_of_the_page(home: Home) -> Non
     text = Path(download.value.path()).read_text(encoding="utf-8")
     assert download.value.suggested_filename == "hubside-comparison.csv"
     assert "3110:01" in text
-    assert "51,0" in text
+    assert "jetzt (RAM)" in text
     assert "30E1" not in text, "what matches is left out, as on the page"
 
 
