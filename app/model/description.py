@@ -230,6 +230,11 @@ class Entry:
     line: int = 0
 
     @property
+    def is_parameter(self) -> bool:
+        """True for what is saved and can be set: no counters, no process values."""
+        return self.saved and self.restore is not RestoreClass.NEVER
+
+    @property
     def title(self) -> str:
         """Name for people: the object's name, and the sub-index's where there is one."""
         return self.name if self.kind is Kind.VAR else f"{self.object_name}: {self.name}"

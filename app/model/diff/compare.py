@@ -75,11 +75,6 @@ class Comparison:
     summary: Summary
 
 
-def is_parameter(entry: Entry) -> bool:
-    """True for what is saved and can be set: no counters, no process values."""
-    return entry.saved and entry.restore is not RestoreClass.NEVER
-
-
 _NOWHERE: Final = (CellState.NOT_IN_SET, CellState.NOT_ON_DEVICE)
 
 
@@ -112,7 +107,7 @@ def _entries(columns: Sequence[Column], everything: bool) -> list[Entry]:
         for entry in column.description:
             place = number, groups.get(entry.group, len(groups)), entry.address, entry
             found.setdefault(entry.address, place)
-            if entry.access.readable and (everything or is_parameter(entry)):
+            if entry.access.readable and (everything or entry.is_parameter):
                 wanted.add(entry.address)
     ordered = sorted((found[address] for address in wanted), key=lambda one: (one[0], one[1], one[2][:2]))
     return [entry for *_, entry in ordered]

@@ -18,7 +18,6 @@ import numpy as np
 import numpy.typing as npt
 
 from app.model.description import Description, Entry, RestoreClass
-from app.model.diff.compare import is_parameter
 from app.model.set_vector import WIDTH, layout_of, pack, places
 from app.service.compare.sources import Columns, Shown
 from app.store.fleet_rows import layouts_of, scan_latest
@@ -286,7 +285,7 @@ def _parameters(golden: Shown) -> tuple[Entry, ...]:
     """The parameters that the golden set has, group by group."""
     description: Description = golden.column.description
     groups = {group: place for place, group in enumerate(description.groups)}
-    found = [one for one in description if is_parameter(one) and one.address in golden.column.values]
+    found = [one for one in description if one.is_parameter and one.address in golden.column.values]
     return tuple(sorted(found, key=lambda one: (groups.get(one.group, len(groups)), one.address[:2])))
 
 

@@ -9,7 +9,7 @@ from typing import Final
 
 from app.model.address import Address, parse_address
 from app.model.datatypes import Raw
-from app.model.description import Entry, RestoreClass
+from app.model.description import Entry
 from app.model.sets import ParameterSet
 from app.model.values import show
 from app.service.devices import Target, decode
@@ -107,11 +107,6 @@ async def changes_since_last_visit(visits: Visits, audit: AuditLog, targets: Ite
     return VisitChanges(Progress.READY, visit, tuple(compared))
 
 
-def is_parameter(entry: Entry) -> bool:
-    """True for what is saved and can be set: no counters, no process values."""
-    return entry.saved and entry.restore is not RestoreClass.NEVER
-
-
 def compare(
     target: Target,
     then: ParameterSet | None,
@@ -125,7 +120,7 @@ def compare(
         return DeviceChanges(target.slug, missing=Time.THEN, replaced=True)
     rows, unknown = [], []
     for entry in target.description:
-        if not is_parameter(entry):
+        if not entry.is_parameter:
             continue
         was_raw, now_raw = then.values.get(entry.address), now.values.get(entry.address)
         if was_raw is None or now_raw is None:

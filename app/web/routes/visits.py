@@ -9,7 +9,7 @@ from fastapi import APIRouter, Query
 from app.model.address import parse_address
 from app.model.roles import Role
 from app.service.office.last_change import history, last_changes
-from app.service.office.visit_changes import changes_since_last_visit, is_parameter
+from app.service.office.visit_changes import changes_since_last_visit
 from app.service.office.visits import STALE, as_known
 from app.store import small_rows
 from app.web.deps import DEVICE, BenchOf, ConnectionOf, PersonOf, TargetOf, needs
@@ -56,7 +56,7 @@ async def left_now(bench: BenchOf, connection: ConnectionOf) -> list[LeftNow]:
     found = []
     for target in connection.targets:
         known = as_known(target, turbine, person, bench.stamper())
-        parameters = [entry.address for entry in target.description if is_parameter(entry)]
+        parameters = [entry.address for entry in target.description if entry.is_parameter]
         reasons = [known.unread[address] for address in parameters if address in known.unread]
         stale = reasons.count(STALE)
         found.append(LeftNow(device=target.slug, parameters=len(parameters), unread=len(reasons) - stale, stale=stale))
