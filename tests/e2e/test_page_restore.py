@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Page, expect, sync_playwright
 
 from tests.e2e.browser import CHROMIUM, FLAGS
+from tests.e2e.conftest import Twins
 from tests.e2e.processes import running
 from tests.e2e.test_browser import SIZE, WAIT_MS, hold
 from tests.e2e.test_page_quality import AXE
@@ -57,17 +59,9 @@ def sets(context: BrowserContext, demo: str) -> str:
     """Ids of the sets of blade 1 as it was found when the visit began."""
     page = context.new_page()
     page.goto(f"{demo.split('?')[0]}?scene=off")
-    found: list[str] = page.wait_for_function(
-        """async (station) => {
-            const records = (await (await fetch("/api/sets")).json()).records;
-            const own = ["pmm", "pmc"].map((name) => records.find((one) => one.origin.device === `${station}/${name}`));
-            return own.every(Boolean) && own.map((one) => one.id);
-        }""",
-        arg=SOURCE,
-        timeout=RUN_MS,
-    ).json_value()
+    found = found_sets(page)
     page.close()
-    return ",".join(found)
+    return found
 
 
 @pytest.fixture
@@ -97,6 +91,36 @@ def api(page: Page, method: str, path: str, body: object = None) -> Any:
     )
     assert status == 200, answer
     return answer
+
+
+def found_sets(page: Page) -> str:
+    """Ids of the sets of blade 1, once they are in the library."""
+    found: list[str] = page.wait_for_function(
+        """async (station) => {
+            const records = (await (await fetch("/api/sets")).json()).records;
+            const own = ["pmm", "pmc"].map((name) => records.find((one) => one.origin.device === `${station}/${name}`));
+            return own.every(Boolean) && own.map((one) => one.id);
+        }""",
+        arg=SOURCE,
+        timeout=RUN_MS,
+    ).json_value()
+    return ",".join(found)
+
+
+def passing_plan(page: Page, order: dict[str, Any]) -> dict[str, Any]:
+    """The plan, once nothing speaks against it any more."""
+    plan: dict[str, Any] = page.wait_for_function(
+        """async (order) => {
+            const headers = { "content-type": "application/json" };
+            const sent = { method: "POST", headers, body: JSON.stringify(order) };
+            const plan = await (await fetch("/api/live/restore/plan", sent)).json();
+            return plan.refusals?.length === 0 && plan;
+        }""",
+        arg=order,
+        timeout=RUN_MS,
+        polling=500,
+    ).json_value()
+    return plan
 
 
 def disturb(page: Page, changes: tuple[tuple[str, str, int], ...] = CHANGED) -> None:
@@ -190,17 +214,7 @@ def test_what_nobody_confirms_is_put_back_and_said_so_in_german(page: Page, demo
     api(page, "POST", "/api/live/stop", {})
     disturb(page, ((PMM, "3110:01", 480),))
     order = {"station": TARGET, "sets": sets.split(","), "selected": [{"device": PMM, "address": "3110:01"}]}
-    plan = page.wait_for_function(
-        """async (order) => {
-            const headers = { "content-type": "application/json" };
-            const sent = { method: "POST", headers, body: JSON.stringify(order) };
-            const plan = await (await fetch("/api/live/restore/plan", sent)).json();
-            return plan.refusals?.length === 0 && plan;
-        }""",
-        arg=order,
-        timeout=RUN_MS,
-        polling=500,
-    ).json_value()
+    plan = passing_plan(page, order)
     begun = api(page, "POST", "/api/live/restore", {**order, "plan_hash": plan["hash"], "confirm_s": 5})
     page.goto(tab(demo, f"restore={begun['id']}&lang=de"))
     expect(page.get_by_test_id("restore-confirm")).to_contain_text("Neue Werte von Blatt 2 behalten?", timeout=RUN_MS)
@@ -220,3 +234,45 @@ def problems(page: Page) -> list[str]:
             .map((one) => ({ id: one.id, nodes: one.nodes.map((node) => node.html.slice(0, 200)) }))"""
     )
     return [f"{one['id']}: {one['nodes']}" for one in found]
+
+
+def test_a_restore_that_was_cut_off_is_told_on_every_page_and_taken_back(
+    browser: Browser, twins: Twins, tmp_path: Path
+) -> None:
+    """The server is killed while new values stand in RAM unconfirmed; the next one blocks the blade and tells of it."""
+    arguments = ("serve", "--site", str(twins.site), "--port", "0", "--data", str(tmp_path / "data"), "--json")
+    with running(*arguments) as server:
+        page = browser.new_page(viewport=SIZE, locale="en-GB", reduced_motion="reduce", bypass_csp=True)
+        page.set_default_timeout(WAIT_MS)
+        page.goto(json.loads(server.wait_for('"url"'))["url"] + "&scene=off")
+        expect(page.get_by_test_id("mode")).to_contain_text("TWIN", timeout=WAIT_MS)
+        order = {"station": TARGET, "sets": found_sets(page).split(",")}
+        disturb(page, ((PMM, "3110:01", 480),))
+        plan = passing_plan(page, order)
+        begun = api(page, "POST", "/api/live/restore", {**order, "plan_hash": plan["hash"]})
+        page.wait_for_function(
+            "async (id) => (await (await fetch(`/api/live/restores/${id}`)).json()).state === 'awaiting-confirmation'",
+            arg=begun["id"],
+            timeout=RUN_MS,
+        )
+        server.popen.kill()
+        server.popen.wait()
+        page.close()
+    with running(*arguments) as server:
+        page = browser.new_page(viewport=SIZE, locale="en-GB", reduced_motion="reduce", bypass_csp=True)
+        page.set_default_timeout(WAIT_MS)
+        page.goto(json.loads(server.wait_for('"url"'))["url"] + "&scene=off")
+        banner = page.get_by_test_id("restore-banner-incomplete")
+        expect(banner).to_contain_text("Restore of Blade 2 incomplete: motion is blocked", timeout=RUN_MS)
+        expect(banner).to_contain_text("STOP and FEATHER work")
+        expect(page.get_by_test_id("mode")).to_contain_text("TWIN", timeout=WAIT_MS)
+        assert problems(page) == []
+        page.get_by_role("link", name="Bus").click()
+        expect(banner.get_by_test_id("resume-hold")).to_be_enabled()
+        banner.get_by_test_id("restore-banner-open").click()
+        expect(page.get_by_test_id("restore-end-incomplete")).to_contain_text("Blade 2 is incomplete")
+        assert problems(page) == []
+        hold(page, "roll-back-hold")
+        expect(page.get_by_test_id("restore-end-old")).to_be_visible(timeout=RUN_MS)
+        assert ram(page, PMM, "3110:01") == 480
+        page.close()
