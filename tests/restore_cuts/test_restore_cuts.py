@@ -83,10 +83,11 @@ async def test_sixty_cuts(bench: Bench, capsys: pytest.CaptureFixture[str]) -> N
     assert after - before > 60, "reads, writes, verifies, saves, restarts and proves"
     first, chance = before - BEFORE_BEGIN, Random(SEED)
     width = (after + BEHIND_END - first) / SAMPLE
-    cuts = [
-        Cut(*COMBINATIONS[n % len(COMBINATIONS)], first + int((n + chance.random()) * width) + 1, n % 2 == 0)
-        for n in range(SAMPLE)
-    ]
+    cuts = []
+    for n in range(SAMPLE):
+        turn, combination = divmod(n, len(COMBINATIONS))
+        at = first + int((n + chance.random()) * width) + 1
+        cuts.append(Cut(*COMBINATIONS[combination], at, stays_off=turn % 2 == 1))
     cuts.sort(key=lambda cut: cut.kind is not Kind.PROCESS)  # all others share a connection
     results = [await bench.run(cut) for cut in cuts]
     _tell(capsys, "sample", results)
