@@ -19,7 +19,7 @@ export function PlanView() {
   const [, update] = usePageSearch();
   const [terms, setTerms] = useState(NO_TERMS);
   const [confirmMin, setConfirmMin] = useState(CONFIRM_MIN);
-  const { order } = useOrder(terms);
+  const order = useOrder(terms);
   const planned = usePlan(order);
   const { plan, lines } = planned;
   const station = useStationName()(order?.station ?? "");

@@ -3,7 +3,7 @@ import { turbineQuery } from "../../../api/queries";
 import { usePageSearch } from "../../../frame/search";
 import { useTexts } from "../../../texts/texts";
 import { History } from "./History";
-import { setsIn } from "./order";
+import { setsIn, useStation } from "./order";
 import { PlanView } from "./PlanView";
 import classes from "./Restore.module.css";
 import { RestoreRun } from "./RestoreRun";
@@ -13,9 +13,10 @@ import { Setup } from "./Setup";
 export function RestoreTab() {
   const t = useTexts();
   const [search] = usePageSearch();
+  const station = useStation();
   const connected = useQuery(turbineQuery).data !== undefined;
   if (search.restore !== undefined) return <RestoreRun key={search.restore} id={search.restore} />;
-  const chosen = search.station !== undefined && setsIn(search.sets).length > 0;
+  const chosen = station !== undefined && setsIn(search.sets).length > 0;
   return (
     <div className={classes.room}>
       {connected ? <Setup /> : <p className={classes.note}>{t("page.restoring.connect_first")}</p>}

@@ -10,7 +10,7 @@ import { stationName } from "../../../ui/devices";
 import { dateAndTime } from "../../../ui/format";
 import { GivenName } from "../motors/GivenName";
 import { assign, type Assigned, exchange, others } from "./assign";
-import { setsIn } from "./order";
+import { setsIn, useStation } from "./order";
 import classes from "./Restore.module.css";
 
 const NONE: SetRecord[] = [];
@@ -22,7 +22,7 @@ export function Setup() {
   const stations = useQuery(turbineQuery).data?.stations ?? [];
   const records = useQuery(setsQuery).data?.records ?? NONE;
   const sets = setsIn(search.sets);
-  const station = stations.find((one) => one.slug === search.station);
+  const station = useStation();
   const onSets = (next: string[]) =>
     update({ sets: next.length === 0 ? undefined : next.join(","), select: undefined, rows: undefined });
   return (

@@ -3,6 +3,7 @@ import { keepPreviousData, useQuery } from "@tanstack/react-query";
 import { useMemo } from "react";
 import { planQuery, type PlanDoc, type PlanRequest } from "../../../api/restore";
 import { turbineQuery } from "../../../api/queries";
+import { setsQuery } from "../../../api/sets";
 import type { StationRef } from "../../../api/types";
 import { usePageSearch } from "../../../frame/search";
 import { placesOf } from "../../../ui/devices";
@@ -21,10 +22,19 @@ export const NO_TERMS: Terms = { restart: true, othersConfirmed: false, accepted
 
 export const setsIn = (text: string | undefined): string[] => (text ?? "").split(",").filter(Boolean);
 
-export function useOrder(terms: Terms): { station: StationRef | undefined; order: PlanRequest | null } {
+/** The station that is restored: the one in the URL, else that of the first set, where it is connected. */
+export function useStation(): StationRef | undefined {
   const [search] = usePageSearch();
-  const turbine = useQuery(turbineQuery).data;
-  const station = turbine?.stations.find((one) => one.slug === search.station);
+  const stations = useQuery(turbineQuery).data?.stations;
+  const records = useQuery(setsQuery).data?.records;
+  const first = records?.find((one) => one.id === setsIn(search.sets)[0]);
+  const slug = search.station ?? first?.origin.device.split("/").slice(0, -1).join("/");
+  return stations?.find((one) => one.slug === slug);
+}
+
+export function useOrder(terms: Terms): PlanRequest | null {
+  const [search] = usePageSearch();
+  const station = useStation();
   const order = useMemo(() => {
     const sets = setsIn(search.sets);
     if (!station || sets.length === 0) return null;
@@ -38,7 +48,7 @@ export function useOrder(terms: Terms): { station: StationRef | undefined; order
       accepted: [...terms.accepted],
     };
   }, [station, search.sets, search.select, terms]);
-  return { station, order };
+  return order;
 }
 
 export interface Planned {
