@@ -168,7 +168,7 @@ def test_a_station_gets_the_values_of_another_one_saved_and_proven(page: Page, d
     expect(page.get_by_test_id("pick-groups")).to_contain_text("3 of 3")
     expect(page.get_by_test_id("what-happens")).to_contain_text("2 values are written to Blade 2 PMM")
     offset = page.get_by_test_id(f"plan-{PMC} 607C")
-    expect(offset).to_contain_text("belongs to another machine")
+    expect(offset).to_contain_text("of another machine")
     assert problems(page) == []
 
     page.get_by_test_id(f"pick-{PMC} 6065").click()
