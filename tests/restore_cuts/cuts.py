@@ -27,6 +27,7 @@ from app.model.sets import dump_set
 from app.model.station import Place
 from app.service.connection import Connection
 from app.service.records.check import Verdict, check_file
+from app.service.records.restore_record import Outcome, RestoreRecord
 from app.service.restore.desk import Desk
 from app.service.restore.order import Cause
 from app.service.restore.survey import survey, targets_of
@@ -326,7 +327,7 @@ class Bench:
             await way(one.connection, restore_id, "tester")
             if await one.desk.wait(restore_id) is goal:
                 self._holds(goal, cut)
-                return await _is_recorded(one.desk, restore_id, goal)
+                return _tells(await is_recorded(one.desk, restore_id, Outcome(goal.value)), goal)
             outcome = (await one.desk.get(restore_id)).outcome
             del outcome["events"]
             assert Cause(outcome["cause"]) in UNANSWERED, f"{cut}: to {goal.value}, {outcome}"
@@ -340,18 +341,23 @@ class Bench:
         assert self.station.ram([MODE])[MODE] != HOMING, f"{cut}: the axis was left in homing mode"
 
 
-async def _is_recorded(desk: Desk, restore_id: str, end: End) -> None:
+async def is_recorded(desk: Desk, restore_id: str, outcome: Outcome) -> RestoreRecord:
     """Its record says so, and is sealed by this installation."""
     sealed, key = await desk.record(restore_id), desk.key()
     assert sealed is not None and key is not None
     checked = check_file(sealed.json.encode(), {key.public: "ours"})
     assert checked.verdict is Verdict.GOOD
-    assert checked.record is not None and checked.record.outcome.value == end.value
-    written = [row for row in checked.record.rows if row.treatment is Treatment.WRITE]
+    assert checked.record is not None
+    assert checked.record.outcome is outcome
+    return checked.record
+
+
+def _tells(record: RestoreRecord, end: End) -> None:
+    """What it says of the values is true."""
+    written = [row for row in record.rows if row.treatment is Treatment.WRITE]
     assert {(row.device, row.address) for row in written} == {(one.slug, one.address.short) for one in NEW}
     for row in written:
-        wanted = row.wanted if end is End.NEW else row.was
-        assert row.now == wanted, row
+        assert row.now == (row.wanted if end is End.NEW else row.was), row
 
 
 async def _connected(connection: Connection) -> None:

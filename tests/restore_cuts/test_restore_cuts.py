@@ -12,6 +12,7 @@ import os
 from collections import Counter
 from collections.abc import AsyncIterator, Iterable
 from contextlib import asynccontextmanager
+from functools import partial
 from pathlib import Path
 from random import Random
 from tempfile import TemporaryDirectory
@@ -19,10 +20,12 @@ from typing import Final
 
 import pytest
 
+from app.service.records.restore_record import Outcome
 from app.service.restore.order import Cause
 from app.service.restore.transaction import End
 from app.service.stop import Command, command_all
-from tests.restore_cuts.cuts import Bench, Cut, Kind, Result
+from app.store.restore_rows import RestoreState, put_state
+from tests.restore_cuts.cuts import Bench, Cut, Kind, Result, is_recorded
 from tests.restore_cuts.station import Station
 from tests.restore_cuts.tool import hurry
 from tests.restore_cuts.trigger import Manner
@@ -115,6 +118,17 @@ async def test_who_feathers_a_blade_that_is_left_incomplete_stops_it_before_a_wa
             await one.desk.resume(one.connection, restore_id, "tester")
             assert await one.desk.wait(restore_id) is End.NEW
             assert bench.truth() is End.NEW
+
+
+async def test_a_restore_whose_tool_was_killed_has_its_record(bench: Bench) -> None:
+    """Of each of its ends, also of those that nobody lived to seal."""
+    at = await bench.sdos_before() + IN_THE_MIDST
+    async with bench.left_incomplete(at) as (one, restore_id):
+        await is_recorded(one.desk, restore_id, Outcome.INCOMPLETE)
+        # As if the next tool had rolled back, and had been killed before it sealed that.
+        put = partial(put_state, restore_id=restore_id, state=RestoreState.ROLLED_BACK, outcome="{}", ended_ns=1)
+        await one.office.store.run(put)
+        await is_recorded(one.desk, restore_id, Outcome.OLD)
 
 
 @pytest.mark.soak

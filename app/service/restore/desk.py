@@ -24,6 +24,7 @@ from app.errors import (
     UsageError,
 )
 from app.model.description import Description
+from app.model.description_file import load_builtin
 from app.model.set_record import SetRecord, Source
 from app.service.connection import Connection
 from app.service.devices import Target
@@ -38,7 +39,7 @@ from app.service.restore.log import Kept, RestoreLog, event, load, new_row, valu
 from app.service.restore.motor_given import note_motors
 from app.service.restore.order import Broken, Cause, Order, Timing
 from app.service.restore.prepare import Prepared, prepare
-from app.service.restore.record import RecordOf
+from app.service.restore.record import RecordOf, outcome_of
 from app.service.restore.steps import Hands
 from app.service.restore.survey import Progress, Survey, targets_of
 from app.service.restore.transaction import End, Terms, Transaction
@@ -311,7 +312,23 @@ class Desk:
         await asyncio.gather(*self._endings, return_exceptions=True)
 
     async def record(self, restore_id: str) -> SealedRecord | None:
-        """The sealed record of a restore that has come to an end, be it incomplete. Raises StoreError."""
+        """The sealed record of a restore that has come to an end, be it incomplete. Raises StoreError.
+
+        A tool that was killed may have left none, or that of an earlier end: it is made of what the store kept then.
+        """
+        sealed, kept = await self._sealed(restore_id), await load(self._store, restore_id)
+        if kept is None or self.at_work(restore_id) is not None:
+            return sealed
+        if sealed is not None and sealed.record.outcome is outcome_of(kept.row.state):
+            return sealed
+        try:
+            descriptions = {one["slug"]: load_builtin(one["description"][0]) for one in kept.details["devices"]}
+        except UsageError:  # of a file that is gone
+            return sealed
+        await self._seal(restore_id, descriptions, None, [])
+        return await self._sealed(restore_id)
+
+    async def _sealed(self, restore_id: str) -> SealedRecord | None:
         found = await self._store.run(lambda connection: rows.get_record(connection, restore_id))
         return None if found is None else SealedRecord(*found)
 

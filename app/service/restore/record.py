@@ -60,6 +60,11 @@ CHECKS: Final = (
 """What was looked at before the first write; the restore would not have begun had one of them spoken against it."""
 
 
+def outcome_of(state: RestoreState) -> Outcome:
+    """What a record says of a restore in ``state``."""
+    return _OUTCOMES.get(state, Outcome.INCOMPLETE)
+
+
 class RecordOf:
     """Makes the record of one restore. ``after``: what was read at the end, by slug; ``descriptions`` by slug."""
 
@@ -85,7 +90,7 @@ class RecordOf:
         return RestoreRecord(
             id=row.id,
             station=row.station,
-            outcome=_OUTCOMES.get(row.state, Outcome.INCOMPLETE),
+            outcome=outcome_of(row.state),
             person=row.person,
             reason=row.reason,
             work_order=row.work_order,
