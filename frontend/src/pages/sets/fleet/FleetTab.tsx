@@ -1,11 +1,13 @@
 import { SegmentedControl } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { useMemo } from "react";
+import { Problem } from "../../../api/client";
 import { fleetQuery } from "../../../api/fleet";
 import { knownDescriptionQuery } from "../../../api/sets";
 import { usePageSearch } from "../../../frame/search";
 import { useTexts } from "../../../texts/texts";
 import { ProblemAlert } from "../../../ui/ProblemAlert";
+import room from "../../../ui/Room.module.css";
 import classes from "./Fleet.module.css";
 import { FleetSentence } from "./FleetSentence";
 import { GoldenPicker } from "./GoldenPicker";
@@ -35,6 +37,8 @@ export function FleetTab() {
   const description = useQuery({ ...knownDescriptionQuery(kind), enabled: kind !== "" }).data;
   const names = useMemo(() => fleetNames(description, t), [description, t]);
   const doc = kind === "" ? undefined : query.data;
+  const unmarked = record === null && isUnmarked(query.error);
+  const kindName = kinds.find((one) => one.id === kind)?.name ?? kind;
   return (
     <div className={classes.room}>
       <div className={classes.tools}>
@@ -55,7 +59,8 @@ export function FleetTab() {
         )}
       </div>
       {kind === "" && <p>{t("page.fleet.nothing_known")}</p>}
-      {query.isError && <ProblemAlert error={query.error} title={t("page.fleet.failed")} />}
+      {unmarked && <p className={room.note}>{t("page.fleet.no_golden", { name: kindName })}</p>}
+      {query.isError && !unmarked && <ProblemAlert error={query.error} title={t("page.fleet.failed")} />}
       {doc && !query.isError && (
         <>
           <FleetSentence doc={doc} />
@@ -67,3 +72,7 @@ export function FleetTab() {
     </div>
   );
 }
+
+/** True where no set of the kind was marked golden yet: nothing has failed, there is something to do. */
+const isUnmarked = (error: Error | null): boolean =>
+  error instanceof Problem && error.doc.details.reason_key === "compare.unresolved.no-golden";
