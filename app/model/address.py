@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from enum import Enum
+from functools import lru_cache
 from typing import NamedTuple
 
 from app.errors import UsageError
@@ -47,6 +48,7 @@ def is_decimal(text: str) -> bool:
     return text.isascii() and text.isdecimal() and len(text) <= 12
 
 
+@lru_cache(maxsize=8192)
 def parse_address(text: str) -> Address:
     """Read ``6065``, ``3110:01`` (hexadecimal) or ``12/221`` (decimal IND/PNU).
 
