@@ -90,7 +90,7 @@ async def test_sixty_cuts(bench: Bench, capsys: pytest.CaptureFixture[str]) -> N
     for n in range(SAMPLE):
         turn, combination = divmod(n, len(COMBINATIONS))
         at = first + int((n + chance.random()) * width) + 1
-        cuts.append(Cut(*COMBINATIONS[combination], at, stays_off=turn % 2 == 1))
+        cuts.append(Cut(*COMBINATIONS[combination], at, stays_off=turn % 3 == 2))
     cuts.sort(key=lambda cut: cut.kind is not Kind.PROCESS)  # all others share a connection
     results = [await bench.run(cut) for cut in cuts]
     _tell(capsys, "sample", results)

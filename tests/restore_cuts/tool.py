@@ -27,7 +27,7 @@ from tests.restore_cuts.station import STATION
 
 TIMEOUT_S: Final = 0.15
 """For every answer: many times what a twin needs that is alive."""
-TIMING: Final = Timing(ready_s=0.4, quiet_s=1.0, boot_s=0.5, mode_s=0.3)
+TIMING: Final = Timing(ready_s=0.25, quiet_s=1.0, boot_s=0.5, mode_s=0.3)
 KEPT: Final = {
     "oat-pmm": ("1000", "1008", "1010", "1018:04", "3000", "3004", "30FA", "30FB:07", "30FB:08", "30FC", "3110:01"),
     "oat-pmc": (
