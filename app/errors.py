@@ -46,6 +46,7 @@
     │   ├── RestoreUnknownError             no such restore
     │   ├── SetUnknownError                 no such parameter set
     │   ├── SetTagError                     a tag that visits give, not people
+    │   ├── SetIncompleteError              a set with unread objects cannot be golden
     │   ├── NameplateError                  a serial number that is none, or typed differently twice
     │   ├── NoInstructorError               the connected turbine is none of the twins that we started
     │   └── FaultOrderError                 a fault that cannot be put into a twin so; names the field
@@ -348,6 +349,12 @@ class SetTagError(RefusedError):
     """Visits give this tag, not people. Details: tag."""
 
     code = "set_tag"
+
+
+class SetIncompleteError(RefusedError):
+    """A set with unread objects cannot be golden: what it lacks would not be compared. Details: set, tag, unread."""
+
+    code = "set_incomplete"
 
 
 class NameplateError(RefusedError):

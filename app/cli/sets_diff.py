@@ -76,7 +76,8 @@ async def _diff(arguments: argparse.Namespace, output: Output) -> int:
         ground, specs = await _ground(arguments, output, specs, stack)
         compared = await compare_columns(Columns(ground), [str(one) for one in specs], everything=arguments.all)
     _tell(arguments, output, compared)
-    return DIFFERENT if any(row.state in _MATTER for row in compared.comparison.rows) else 0
+    rows, summary = compared.comparison.rows, compared.comparison.summary
+    return DIFFERENT if summary.undescribed_different or any(row.state in _MATTER for row in rows) else 0
 
 
 def _spec(text: str) -> ColumnSpec:

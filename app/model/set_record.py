@@ -55,6 +55,11 @@ class SetRecord:
     unread: int
     empty: int
 
+    @property
+    def complete(self) -> bool:
+        """True where every readable object was read."""
+        return self.unread == 0
+
     def scope_of(self, tag: Tag) -> str:
         """What a tag is about: one golden set a kind of device, the others one a device."""
         return self.description_id if tag is Tag.GOLDEN else self.origin.device

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Sequence
 from typing import Any, Final
 
@@ -9,17 +10,20 @@ from sqlalchemy import Connection, delete, insert, select
 
 from app.model.set_vector import layout_of, pack
 from app.model.sets import ParameterSet
-from app.store.schema import set_latest, set_layouts
+from app.store.schema import set_latest, set_layouts, set_records
 
 CHUNK: Final = 128
 """Rows that are handed on at once: a few hundred kilobytes, which stay in the processor's cache."""
 
 
 def keep_latest(connection: Connection, record_id: str, parameters: ParameterSet) -> None:
-    """A record was added: it is the latest of its device, unless a later one is there."""
+    """A record was added: it is the latest of its device, unless a later one is there.
+
+    A fragment never takes the place of a complete set, however late it is: what it lacks would pass for equal.
+    """
     device, t_ns = parameters.origin.device, parameters.origin.t_ns
-    known = connection.scalar(select(set_latest.c.t_ns).where(set_latest.c.device == device))
-    if known is not None and known > t_ns:
+    known = _rank_of_latest(connection, device)
+    if known is not None and known > (parameters.complete, t_ns):
         return
     layout = layout_of(parameters.values)
     row = {
@@ -31,6 +35,14 @@ def keep_latest(connection: Connection, record_id: str, parameters: ParameterSet
     }
     connection.execute(delete(set_latest).where(set_latest.c.device == device))
     connection.execute(insert(set_latest), row)
+
+
+def _rank_of_latest(connection: Connection, device: str) -> tuple[bool, int] | None:
+    """Whether the latest set of a device is complete, and its time; None where there is none."""
+    joined = set_latest.join(set_records, set_records.c.id == set_latest.c.record_id)
+    query = select(set_latest.c.t_ns, set_records.c.unread).select_from(joined).where(set_latest.c.device == device)
+    row = connection.execute(query).first()
+    return None if row is None else (not json.loads(row.unread), row.t_ns)
 
 
 def layouts_of(connection: Connection, description_id: str) -> dict[int, tuple[str, tuple[str, ...]]]:

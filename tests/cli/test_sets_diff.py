@@ -80,6 +80,35 @@ def test_it_is_written_as_csv_and_as_html(tmp_path: Path, capsys: Captured) -> N
     assert page.read_text(encoding="utf-8").count('<tr class="same">') > 50
 
 
+def test_objects_that_nothing_describes_are_told_and_count(tmp_path: Path, capsys: Captured) -> None:
+    names, unknown = ("before.json", "after.json", "more.json"), Address(0x2FFF)
+    files = [
+        file(tmp_path, replace(BEFORE, values={**BEFORE.values, unknown: raw, Address(0x2FFE): 1}), name)
+        for name, raw in zip(names, (1, 1, 2), strict=True)
+    ]
+    assert main(["sets", "diff", *files[:2]]) == 0
+    assert capsys.readouterr().out.rstrip().endswith(", 2 objects are not described here (different: 0)")
+    assert main(["sets", "diff", files[0], files[2]]) == 1
+    told = capsys.readouterr().out.splitlines()[-1]
+    assert told.startswith("0 differ, ")
+    assert told.endswith(", 2 objects are not described here (different: 1)")
+    page = tmp_path / "page.html"
+    assert main(["sets", "diff", files[0], files[2], "--html", str(page)]) == 1
+    assert "(different: 1)" in page.read_text(encoding="utf-8")
+
+
+def test_no_head_of_the_csv_file_is_a_formula(tmp_path: Path, capsys: Captured) -> None:
+    """A file that somebody sent says itself which device it is of."""
+    files = [
+        file(tmp_path, replace(BEFORE, origin=replace(ORIGIN, device=device)), f"{number}.json")
+        for number, device in enumerate(("=HYPERLINK(A1)/b/c", "@x/b/c"))
+    ]
+    assert main(["sets", "diff", *files, "--csv", "--same"]) == 0
+    head, *rows = csv.reader(io.StringIO(capsys.readouterr().out))
+    assert sum(cell.startswith(("'=HYPERLINK", "'@x")) for cell in head) == 4
+    assert not [cell for row in (head, *rows) for cell in row if cell.startswith(("=", "@", "+"))]
+
+
 @pytest.mark.parametrize(
     ("columns", "named"),
     [

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -72,7 +72,7 @@ def test_one_bad_file_and_none_is_taken(sets: Sets, tmp_path: Path) -> None:
 
 def test_tags_and_nameplates_and_what_is_refused(sets: Sets, tmp_path: Path) -> None:
     source = tmp_path / "in.json"
-    source.write_text(dump_set(whole_set("oat-pmc")))
+    source.write_text(dump_set(replace(whole_set("oat-pmc"), unread={})))
     key = sets.json("import", source)["id"]
     assert sets.json("tag", key, "golden")["tags"] == ["golden"]
     assert [one["id"] for one in sets.json("list", "--tag", "golden")] == [key]
@@ -82,6 +82,16 @@ def test_tags_and_nameplates_and_what_is_refused(sets: Sets, tmp_path: Path) -> 
     assert sets("nameplate", "wtg-07/blade-1/pmc", "P1")[0] == 2
     assert sets.json("nameplate", "wtg-07/blade-1/pmc", "P1", "P1")["serial"] == "P1"
     assert sets.json("nameplate", "wtg-07/blade-1/pmc")["serial"] == "P1"
+
+
+def test_a_set_with_unread_objects_is_not_taken_as_golden(sets: Sets, tmp_path: Path) -> None:
+    source = tmp_path / "in.json"
+    source.write_text(dump_set(whole_set("oat-pmc")))
+    key = sets.json("import", source)["id"]
+    code, _out, err = sets("tag", key, "golden")
+    assert code == 3
+    assert "Back up the device again" in err
+    assert sets.json("list", "--tag", "golden") == []
 
 
 def test_sets_come_out_of_a_recording_with_the_instant_and_direction_of_each_value(sets: Sets) -> None:

@@ -140,13 +140,17 @@ async def test_a_fleet_is_held_against_its_golden_set(server: Server) -> None:
     sets = []
     for blade in (1, 2, 3):
         target = connection.target(f"wtg-07/blade-{blade}/pmm")
-        made = as_known(target, "wtg-07", "Anna", 1_800_000_000_000_000_000)
+        made = replace(as_known(target, "wtg-07", "Anna", 1_800_000_000_000_000_000), unread={})
         sets.append(replace(made, values={**made.values, parse_address("3110:01"): 500 if blade == 1 else 490}))
+    few = {parse_address("3110:01"): 500}
+    elsewhere = replace(sets[0].origin, turbine="wtg-08", device="wtg-08/blade-1/pmm")
+    sets.append(replace(sets[0], origin=elsewhere, values=few, unread={parse_address("3110:02"): "no_answer"}))
     records = await library.put(sets, Source.BACKUP)
     await library.tag(records[0].id, Tag.GOLDEN, "Eva")
     asked = {"description_id": "oat-pmm", "group": "temperatures", "limit": 2}
     doc = (await server.client.post("/api/fleet", json=asked)).json()
-    assert (doc["total"], doc["equal"], doc["golden"]["record"]) == (3, 1, records[0].id)
+    assert (doc["total"], doc["equal"], doc["golden"]["record"]) == (4, 1, records[0].id)
+    assert (doc["different"], doc["incomplete"]) == (2, 1), "what was not read is not equal"
     assert [(one["device"], one["different"], one["top"]) for one in doc["devices"]] == [
         ("wtg-07/blade-2/pmm", 1, ["3110:01"]),
         ("wtg-07/blade-3/pmm", 1, ["3110:01"]),
@@ -154,7 +158,7 @@ async def test_a_fleet_is_held_against_its_golden_set(server: Server) -> None:
     first = doc["devices"][0]
     assert first["by_group"][doc["groups"].index("temperatures")] == 1
     assert dict(zip(doc["marked"], first["marks"], strict=True))["3110:01"] == "different"
-    (address,) = doc["addresses"]
+    (address,) = [one for one in doc["addresses"] if one["different"]]
     assert (address["address"], address["golden_shown"], address["golden_unit"], address["different"]) == (
         "3110:01",
         "50.0",

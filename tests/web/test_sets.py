@@ -143,6 +143,23 @@ async def test_tags_go_from_set_to_set_and_stay_in_the_history(server: Server) -
     assert [row.kind for row in rows] == ["set_untagged", "set_tagged", "set_tagged"]
 
 
+async def test_an_expert_is_told_why_a_set_with_unread_objects_cannot_be_golden(server: Server) -> None:
+    anna = {"name": "Anna", "password": "pitch and yaw 7"}
+    assert (await server.client.post("/api/users", json=anna)).json()["role"] == "expert"
+    assert (await server.client.post("/api/login", json=anna)).status_code == 200
+    lacking = whole_set("oat-pmc")
+    whole = replace(lacking, origin=replace(lacking.origin, time="2026-03-05T00:00:00Z"), unread={})
+    keys = [
+        (await imported(server, "x.json", dump_set(each).encode())).json()["record"]["id"] for each in (lacking, whole)
+    ]
+    wanted = {"tag": "golden", "on": True}
+    refused = await server.client.post(f"/api/sets/{keys[0]}/tags", json=wanted, headers={"Accept-Language": "de"})
+    assert (refused.status_code, refused.json()["code"]) == (422, "set_incomplete")
+    assert "erneut sichern" in refused.json()["text"]
+    assert (await server.client.post(f"/api/sets/{keys[1]}/tags", json=wanted)).status_code == 200
+    assert [one["id"] for one in (await listed(server, tag="golden"))["records"]] == [keys[1]]
+
+
 async def test_a_nameplate_must_be_typed_the_same_twice(server: Server) -> None:
     typed = {"device": "wtg-07/blade-2/pmc", "serial": "P-1", "again": "P-2"}
     refused = await server.client.put("/api/nameplates", json=typed)

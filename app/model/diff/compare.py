@@ -7,7 +7,7 @@ compared is a matter of all of them.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Final
 
@@ -52,7 +52,11 @@ class Row:
 
 @dataclass(frozen=True, slots=True)
 class Summary:
-    """Rows by state; the five add up to all. ``unread``: rows of any state in which a value was not read."""
+    """Rows by state; the five add up to all. ``unread``: rows of any state in which a value was not read.
+
+    ``undescribed``: addresses in no row, at which a column has a value that its description does not know. So many of
+    them as ``undescribed_different`` are not the same in every column.
+    """
 
     different: int = 0
     same: int = 0
@@ -60,6 +64,8 @@ class Summary:
     missing: int = 0
     not_comparable: int = 0
     unread: int = 0
+    undescribed: int = 0
+    undescribed_different: int = 0
 
     @property
     def rows(self) -> int:
@@ -82,7 +88,7 @@ def compare(columns: Sequence[Column], everything: bool = False) -> Comparison:
     """Compare ``columns``: parameters only, or ``everything`` that can be read. What none of them has is no row."""
     rows = (_row(entry, columns) for entry in _entries(columns, everything))
     kept = tuple(row for row in rows if not all(cell.state in _NOWHERE for cell in row.cells))
-    return Comparison(kept, summary_of(kept))
+    return Comparison(kept, _with_undescribed(summary_of(kept), kept, columns))
 
 
 def summary_of(rows: Sequence[Row]) -> Summary:
@@ -96,6 +102,17 @@ def summary_of(rows: Sequence[Row]) -> Summary:
         not_comparable=counts[RowState.NOT_COMPARABLE],
         unread=sum(any(cell.state is CellState.UNREAD for cell in row.cells) for row in rows),
     )
+
+
+def _with_undescribed(summary: Summary, rows: Sequence[Row], columns: Sequence[Column]) -> Summary:
+    """Nobody can say what stands there, only whether it is the same: it is counted, so that it is not passed over."""
+    told = {row.address for row in rows}
+    unknown = {address for one in columns for address in one.values if address not in one.description.entries} - told
+    differ = sum(
+        not all(address in one.values for one in columns) or len({one.key(address) for one in columns}) > 1
+        for address in unknown
+    )
+    return replace(summary, undescribed=len(unknown), undescribed_different=differ)
 
 
 def _entries(columns: Sequence[Column], everything: bool) -> list[Entry]:
@@ -134,8 +151,14 @@ def _table(entry: Entry, columns: Sequence[Column]) -> BitTable | None:
 
 def _state(address: Address, cells: Sequence[Cell], valued: Sequence[Column], rescaled: bool) -> RowState:
     if len({column.key(address) for column in valued}) > 1 or rescaled:
-        bound = all(column.description.entries[address].restore is RestoreClass.UNIT for column in valued)
+        bound = all(_is_bound(column, address) for column in valued)
         return RowState.UNIT if bound else RowState.DIFFERENT
     if len(valued) == len(cells) or all(cell.state is CellState.EMPTY for cell in cells):
         return RowState.SAME
     return RowState.MISSING
+
+
+def _is_bound(column: Column, address: Address) -> bool:
+    """True where the column's own description binds it to the unit; what it does not know is not bound."""
+    entry = column.description.entries.get(address)
+    return entry is not None and entry.restore is RestoreClass.UNIT

@@ -43,7 +43,11 @@ def to_html(compared: Compared, texts: Texts, same: bool = False) -> str:
     words = Words(texts)
     rows = rows_of(compared.comparison.rows, same)
     groups = "".join(_group(title, list(some), compared, words) for title, some in groupby(rows, key=words.group))
-    nothing = "" if rows else f"<p>{escape(texts('compare.nothing'))}</p>"
+    nothing = (
+        ""
+        if rows or compared.comparison.summary.undescribed_different
+        else f"<p>{escape(texts('compare.nothing'))}</p>"
+    )
     title = texts("compare.title")
     return f"""<!doctype html>
 <html lang="{escape(texts("compare.language"))}">
@@ -116,17 +120,18 @@ def to_csv(compared: Compared, texts: Texts, same: bool = False) -> str:
     head = ["address", "bit", "name", "group", "class", "state", "findings"]
     for one in compared.columns:
         head += [words.title(one), f"{words.title(one)}: raw"]
-    writer.writerow(head)
+    writer.writerow(map(_harmless, head))
     for row in rows_of(compared.comparison.rows, same):
         rules = " ".join(compared.findings.get(row.address, {}))
         group, restore = words.group(row), row.entry.restore.value
         cells = [text for cell in row.cells for text in (words.value(cell), _raw(cell.raw))]
         fixed = [row.address.short, "", words.name(row), group, restore, row.state.value, rules]
-        writer.writerow([*fixed, *map(_harmless, cells)])
+        writer.writerow(map(_harmless, [*fixed, *cells]))
         for bit in row.bits:
             if bit.differs:
                 cells = [text for number in bit.values for text in (words.bit_value(bit, number), _raw(number))]
-                writer.writerow([row.address.short, bit.bit, words.bit(bit), group, restore, "different", "", *cells])
+                fixed = [row.address.short, str(bit.bit), words.bit(bit), group, restore, "different", ""]
+                writer.writerow(map(_harmless, [*fixed, *cells]))
     return out.getvalue()
 
 
@@ -137,6 +142,6 @@ def _raw(raw: Raw | None) -> str:
 
 
 def _harmless(text: str) -> str:
-    """A text of a device that a spreadsheet would take for a formula, as plain text; numbers stay numbers."""
+    """A text of elsewhere that a spreadsheet would take for a formula, as plain text; numbers stay numbers."""
     number = text.replace(".", "", 1).removeprefix("-").isdecimal()
     return f"'{text}" if text[:1] in ("=", "+", "-", "@", "\t") and not number else text

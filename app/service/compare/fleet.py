@@ -102,11 +102,20 @@ class Fleet:
     @cached_property
     def by_group(self) -> Counts:
         """Differences that must not be, a row for each member and a column for each group."""
+        return self._grouped(self.differs & ~self.bound)
+
+    @cached_property
+    def missing_by_group(self) -> Counts:
+        """What is missing, a row for each member and a column for each group."""
+        found: Counts = self._grouped(self.lacks)[self.layout]
+        return found
+
+    def _grouped(self, marked: Bools) -> Counts:
         names = [entry.group for entry in self.entries]
         starts = [names.index(group) for group in self.groups]  # the entries of a group stand together
         if not starts:
-            return np.zeros((len(self.members), 0), np.uint16)
-        found: Counts = np.add.reduceat(self.differs & ~self.bound, starts, axis=1, dtype=np.uint16)
+            return np.zeros((len(marked), 0), np.uint16)
+        found: Counts = np.add.reduceat(marked, starts, axis=1, dtype=np.uint16)
         return found
 
     def ranking(self) -> list[int]:

@@ -21,6 +21,7 @@ from app.service.compare.known import Known, defaults_of, ram_of, stored_of
 from app.service.compare.spec import ColumnKind, ColumnSpec, Unresolved, parse_spec
 from app.service.devices import Target
 from app.service.library.library import Library
+from app.service.office.visits import known_empty
 from app.service.views import RawJson, raw_from_json
 from app.store.set_rows import Filter
 from app.store.visit_rows import Phase
@@ -119,12 +120,16 @@ class Columns:
         if read is not None:
             return self.of_set(spec, read)
         values, unread = ram_of(target)
-        known = {address: why for address, why in unread.items() if address not in changes}
-        return self._of_target(spec, target, ({**values, **changes}, known))
+        found = None if self.ground.visits is None else self.ground.visits.found.get(spec.of)
+        empty = known_empty(found, values, unread) - changes.keys()
+        known = {address: why for address, why in unread.items() if address not in changes and address not in empty}
+        return self._of_target(spec, target, ({**values, **changes}, known), empty)
 
-    def _of_target(self, spec: ColumnSpec, target: Target, known: Known) -> Shown:
+    def _of_target(
+        self, spec: ColumnSpec, target: Target, known: Known, empty: frozenset[Address] = frozenset()
+    ) -> Shown:
         description = target.description
-        column = Column(target.slug, description, description.version, *known)
+        column = Column(target.slug, description, description.version, *known, empty=empty)
         return Shown(spec, column, self.ground.stamp(), twin=_is_twin(target.lookup(_NAME)))
 
     def _default(self, spec: ColumnSpec) -> Shown:
@@ -211,13 +216,14 @@ class Columns:
         return None
 
     async def _year(self, spec: ColumnSpec) -> Shown:
-        """The record that is nearest to one year ago, and old enough."""
+        """The record that is nearest to one year ago, and old enough; a fragment only where no other is."""
         now_ns = self.ground.stamp()
         records = await self._library(spec).records(Filter(device=spec.of))
         old = [one for one in records if now_ns - one.t_ns >= LEAST_NS]
         if not old:
             raise Unresolved.NO_YEAR.error(str(spec))
-        return await self._of_record(spec, min(old, key=lambda one: abs(now_ns - one.t_ns - YEAR_NS)))
+        best = min(old, key=lambda one: (not one.complete, abs(now_ns - one.t_ns - YEAR_NS)))
+        return await self._of_record(spec, best)
 
 
 def _is_twin(name: Raw | None) -> bool | None:

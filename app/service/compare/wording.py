@@ -15,7 +15,7 @@ from app.service.records.view import visible
 
 DASH: Final = "–"
 _ALWAYS: Final = ("different", "same", "unit", "missing")
-_WHERE_ANY: Final = ("not_comparable", "unread")
+_WHERE_ANY: Final = ("not_comparable", "unread", "undescribed")
 
 
 class Words:
@@ -28,7 +28,11 @@ class Words:
         """``7 differ, 120 match, 2 bound to this unit, 0 not found``, and what else there is."""
         counts = {part: int(getattr(summary, part)) for part in (*_ALWAYS, *_WHERE_ANY)}
         return ", ".join(
-            self.texts(f"page.compare.sum.{part}{'_one' if count == 1 else ''}", count=count)
+            self.texts(
+                f"page.compare.sum.{part}{'_one' if count == 1 else ''}",
+                count=count,
+                different=summary.undescribed_different,
+            )
             for part, count in counts.items()
             if part in _ALWAYS or count
         )

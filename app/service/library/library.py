@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Any, Final
 
-from app.errors import NameplateError, SetTagError, SetUnknownError, StoreDamagedError
+from app.errors import NameplateError, SetIncompleteError, SetTagError, SetUnknownError, StoreDamagedError
 from app.model.set_head import Imported
 from app.model.set_record import SetRecord, Source, Tag, TagEntry
 from app.model.sets import ParameterSet
@@ -100,10 +100,15 @@ class Library:
     # -- tags -------------------------------------------------------------------------
 
     async def tag(self, key: str, tag: Tag, person: str, on: bool = True) -> SetRecord:
-        """Give a record a tag, or take it off. Who had it before loses it. Raises SetUnknownError, SetTagError."""
+        """Give a record a tag, or take it off. Who had it before loses it.
+
+        Raises SetUnknownError, SetTagError; SetIncompleteError where a set with unread objects is to be golden.
+        """
         record = await self.record(key)
         if not tag.by_hand:
             raise SetTagError(tag=tag.value)
+        if on and tag is Tag.GOLDEN and not record.complete:
+            raise SetIncompleteError(set=record.id, tag=tag.value, unread=record.unread)
         bearer = await self.tagged(tag, record.scope_of(tag))
         if on == (bearer is not None and bearer.id == record.id):
             return record

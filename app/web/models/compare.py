@@ -174,7 +174,11 @@ class CompareRow(BaseModel):
 
 
 class SummaryDoc(BaseModel):
-    """Rows by state: the first five add up to all. ``unread``: rows of any state in which a value was not read."""
+    """Rows by state: the first five add up to all. ``unread``: rows of any state in which a value was not read.
+
+    ``undescribed``: objects in no row, because no description here knows them; so many as ``undescribed_different`` are
+    not the same in every column.
+    """
 
     model_config = ConfigDict(from_attributes=True)
 
@@ -184,6 +188,8 @@ class SummaryDoc(BaseModel):
     missing: int
     not_comparable: int
     unread: int
+    undescribed: int
+    undescribed_different: int
 
     @classmethod
     def of(cls, summary: Summary) -> SummaryDoc:

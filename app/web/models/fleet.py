@@ -82,6 +82,8 @@ class FleetAddress(BaseModel):
 class FleetDevice(BaseModel):
     """The latest set of one device. ``by_group``: differences in each group; ``top``: addresses that differ.
 
+    ``missing_by_group``: parameters of each group that the set lacks: nothing says whether they are equal.
+
     ``marks``: of each parameter of the group that was asked for.
     """
 
@@ -93,6 +95,7 @@ class FleetDevice(BaseModel):
     unit: int
     missing: int
     by_group: list[int]
+    missing_by_group: list[int]
     top: list[str]
     marks: list[MarkName]
 
@@ -114,14 +117,17 @@ class ForeignDevice(BaseModel):
 class FleetDoc(BaseModel):
     """One golden set against the latest set of every device of its kind, those that differ most first.
 
-    ``total`` devices were compared, ``equal`` of them have no difference that must not be; ``addresses`` are those that
-    differ or are missing somewhere, the most frequent first. ``marked``: the addresses of the devices' ``marks``.
+    ``total`` devices were compared. ``equal`` of them have every parameter, and no difference that must not be;
+    ``different`` have such a difference, ``incomplete`` lack a parameter, and a device may be of both. ``addresses``
+    are those that differ or are missing somewhere, the most frequent first. ``marked``: those of the ``marks``.
     """
 
     golden: ColumnDoc
     parameters: int
     total: int
     equal: int
+    different: int
+    incomplete: int
     groups: list[str]
     addresses: list[FleetAddress]
     devices: list[FleetDevice]
@@ -131,12 +137,14 @@ class FleetDoc(BaseModel):
     @classmethod
     def of(cls, fleet: Fleet, group: str | None, limit: int) -> FleetDoc:
         """As the page gets it."""
-        different = fleet.count(Mark.DIFFERENT)
+        different, missing = fleet.count(Mark.DIFFERENT), fleet.count(Mark.MISSING)
         return cls(
             golden=ColumnDoc.of(fleet.golden),
             parameters=len(fleet.entries),
             total=len(fleet.members),
-            equal=sum(count == 0 for count in different),
+            equal=sum(not differs and not lacks for differs, lacks in zip(different, missing, strict=True)),
+            different=sum(count > 0 for count in different),
+            incomplete=sum(count > 0 for count in missing),
             groups=list(fleet.groups),
             addresses=_addresses(fleet),
             devices=_devices(fleet, group, limit),
@@ -185,6 +193,7 @@ def _devices(fleet: Fleet, group: str | None, limit: int) -> list[FleetDevice]:
                 unit=counts[Mark.UNIT][row],
                 missing=counts[Mark.MISSING][row],
                 by_group=fleet.by_group[row].tolist(),
+                missing_by_group=fleet.missing_by_group[row].tolist(),
                 top=[entry.address.short for entry, mark in paired if mark is Mark.DIFFERENT][:TOP],
                 marks=[mark.value for entry, mark in paired if entry.group == group],
             )

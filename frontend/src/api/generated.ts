@@ -2868,6 +2868,8 @@ export interface components {
          * FleetDevice
          * @description The latest set of one device. ``by_group``: differences in each group; ``top``: addresses that differ.
          *
+         *     ``missing_by_group``: parameters of each group that the set lacks: nothing says whether they are equal.
+         *
          *     ``marks``: of each parameter of the group that was asked for.
          */
         FleetDevice: {
@@ -2881,6 +2883,8 @@ export interface components {
             marks: ("same" | "different" | "unit" | "missing")[];
             /** Missing */
             missing: number;
+            /** Missing By Group */
+            missing_by_group: number[];
             /** Record */
             record: string;
             /** T Ns */
@@ -2896,14 +2900,17 @@ export interface components {
          * FleetDoc
          * @description One golden set against the latest set of every device of its kind, those that differ most first.
          *
-         *     ``total`` devices were compared, ``equal`` of them have no difference that must not be; ``addresses`` are those that
-         *     differ or are missing somewhere, the most frequent first. ``marked``: the addresses of the devices' ``marks``.
+         *     ``total`` devices were compared. ``equal`` of them have every parameter, and no difference that must not be;
+         *     ``different`` have such a difference, ``incomplete`` lack a parameter, and a device may be of both. ``addresses``
+         *     are those that differ or are missing somewhere, the most frequent first. ``marked``: those of the ``marks``.
          */
         FleetDoc: {
             /** Addresses */
             addresses: components["schemas"]["FleetAddress"][];
             /** Devices */
             devices: components["schemas"]["FleetDevice"][];
+            /** Different */
+            different: number;
             /** Equal */
             equal: number;
             /** Foreign */
@@ -2911,6 +2918,8 @@ export interface components {
             golden: components["schemas"]["ColumnDoc"];
             /** Groups */
             groups: string[];
+            /** Incomplete */
+            incomplete: number;
             /** Marked */
             marked: string[];
             /** Parameters */
@@ -5277,6 +5286,9 @@ export interface components {
         /**
          * SummaryDoc
          * @description Rows by state: the first five add up to all. ``unread``: rows of any state in which a value was not read.
+         *
+         *     ``undescribed``: objects in no row, because no description here knows them; so many as ``undescribed_different`` are
+         *     not the same in every column.
          */
         SummaryDoc: {
             /** Different */
@@ -5287,6 +5299,10 @@ export interface components {
             not_comparable: number;
             /** Same */
             same: number;
+            /** Undescribed */
+            undescribed: number;
+            /** Undescribed Different */
+            undescribed_different: number;
             /** Unit */
             unit: number;
             /** Unread */

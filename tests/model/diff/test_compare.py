@@ -106,6 +106,31 @@ def test_why_there_is_no_value_is_told_apart() -> None:
     assert (row.state, found.summary.missing, found.summary.unread) == (RowState.MISSING, 1, 1)
 
 
+def test_a_value_that_its_own_description_lacks_is_bound_to_no_unit() -> None:
+    """Two columns of one kind have a value at an address that only the third, of another kind, knows."""
+    known = {key: one for key, one in TOY.entries.items() if key != OFFSET}
+    lacking, other = replace(TOY, entries=known), replace(TOY, id="other")
+    columns = [column({}, lacking), column({OFFSET: 5}, lacking), column({OFFSET: None}, other)]
+    assert state(OFFSET, *columns) is RowState.DIFFERENT
+
+
+def test_values_that_no_description_knows_are_counted() -> None:
+    new: dict[Address, Raw | None] = {Address(0x2FF0): 1, Address(0x2FF1): 2, Address(0x2FF2): 3}
+    found = compare([column(new), column({**new, Address(0x2FF1): 9, Address(0x2FF2): None})])
+    assert (found.summary.undescribed, found.summary.undescribed_different) == (3, 2)
+    assert (found.summary.rows, found.summary.different) == (len(PARAMETERS), 0), "they are no rows"
+    equal = compare([column(new), column(new)]).summary
+    assert (equal.undescribed, equal.undescribed_different) == (3, 0)
+    assert compare([column(), column()]).summary.undescribed == 0
+
+
+def test_what_another_description_knows_is_a_row_and_not_counted_again() -> None:
+    lacking = replace(TOY, entries={key: one for key, one in TOY.entries.items() if key != LIMIT})
+    found = compare([column(), column({}, lacking)])
+    assert LIMIT in {row.address for row in found.rows}
+    assert found.summary.undescribed == 0
+
+
 def test_what_no_column_has_is_no_row_and_what_is_empty_everywhere_matches() -> None:
     gone: dict[Address, Raw | None] = {LIMIT: None}
     assert LIMIT not in {row.address for row in compare([column(gone), column(gone)]).rows}

@@ -21,6 +21,7 @@ from app.service.compare.sources import Columns
 from app.service.library.library import Library
 from app.service.office.audit import AuditLog
 from app.store.store import Store
+from app.web.models.fleet import FleetDoc
 from tests.model.diff.devices import LIMIT, MASK, NAME, OFFSET, PARAMETERS, TOY, VALUES
 
 MARKS = {
@@ -104,6 +105,32 @@ async def test_only_the_latest_set_of_a_device_counts_whenever_it_came(kept: Kep
     assert found(fleet, 1)[LIMIT] is Mark.DIFFERENT
     back = await kept.fleet(taken(0), taken(1, minute=20))
     assert found(back, 1)[LIMIT] is Mark.SAME
+
+
+def fragment(device: int, changes: dict[Address, Raw | None], minute: int) -> ParameterSet:
+    """Nobody read LIMIT."""
+    return replace(taken(device, {**changes, LIMIT: None}, minute), unread={LIMIT: "no_answer"})
+
+
+async def test_a_fragment_takes_the_place_of_no_complete_set_in_whatever_order_they_come(kept: Kept) -> None:
+    fleet = await kept.fleet(
+        taken(0),
+        *(taken(1, {MASK: 2}, minute=1), fragment(1, {}, minute=9)),
+        *(fragment(2, {}, minute=9), taken(2, {MASK: 2}, minute=1)),
+        *(fragment(3, {}, minute=1), fragment(3, {MASK: 3}, minute=2), fragment(3, {}, minute=0)),
+    )
+    assert found(fleet, 1)[LIMIT] is found(fleet, 2)[LIMIT] is Mark.SAME
+    assert found(fleet, 1)[MASK] is found(fleet, 2)[MASK] is Mark.DIFFERENT
+    assert (found(fleet, 3)[LIMIT], found(fleet, 3)[MASK]) == (Mark.MISSING, Mark.DIFFERENT)
+
+
+async def test_a_device_whose_set_is_a_fragment_is_incomplete_and_not_equal(kept: Kept) -> None:
+    fleet = await kept.fleet(taken(0), fragment(1, {}, 0), fragment(2, {MASK: 3}, 0), taken(3, {MASK: 3}))
+    doc = FleetDoc.of(fleet, None, 10)
+    assert (doc.total, doc.equal, doc.different, doc.incomplete) == (4, 1, 2, 2)
+    missing = {one.device[:6]: dict(zip(doc.groups, one.missing_by_group, strict=True)) for one in doc.devices}
+    whole, lacking = {"io": 0, "all": 0}, {"io": 0, "all": 1}
+    assert missing == {"wtg-00": whole, "wtg-01": lacking, "wtg-02": lacking, "wtg-03": whole}
 
 
 async def test_another_major_version_or_kind_is_not_compared(kept: Kept) -> None:

@@ -137,6 +137,18 @@ async def test_the_library_gives_golden_and_delivered_sets_and_the_year_before(
     assert compared.columns[0].hash == records[2].hash
 
 
+async def test_a_fragment_is_the_set_of_the_year_before_only_where_no_other_is(
+    connection: Connection, library: Library
+) -> None:
+    one = await taken(connection, PMM)
+    fragment = replace(aged(one, 365, 420), unread={OFFSET: "no_answer"})
+    (record,) = await library.put([fragment], Source.BACKUP)
+    columns = ground(connection, library)
+    assert (await columns.resolve(f"year:{PMM}")).record == record.id
+    whole, _young = await library.put([aged(one, 500, 430), aged(one, 30, 440)], Source.BACKUP)
+    assert (await columns.resolve(f"year:{PMM}")).record == whole.id
+
+
 async def test_a_set_that_is_too_young_is_no_set_of_the_year_before(connection: Connection, library: Library) -> None:
     await library.put([aged(await taken(connection, PMM), 170, 500)], Source.BACKUP)
     with pytest.raises(ColumnError) as caught:

@@ -12,7 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from app.errors import NameplateError, SetTagError, SetUnknownError, StoreDamagedError, StoreError
+from app.errors import NameplateError, SetIncompleteError, SetTagError, SetUnknownError, StoreDamagedError, StoreError
+from app.model.address import Address
 from app.model.set_record import SetRecord, Source, Tag
 from app.model.sets import Identity, ParameterSet, dump_set
 from app.service.library.folder import SetFolder
@@ -38,7 +39,7 @@ async def library_in(folder: Path) -> AsyncIterator[tuple[Library, Store]]:
 
 
 def at(text: str, name: str = "oat-pmc") -> ParameterSet:
-    return whole_set(name, replace(ORIGIN, time=text))
+    return replace(whole_set(name, replace(ORIGIN, time=text)), unread={})
 
 
 async def test_a_content_is_kept_once_and_each_occasion_is_a_record(tmp_path: Path) -> None:
@@ -118,6 +119,18 @@ async def test_a_tag_is_on_one_set_of_its_scope_and_its_history_stays(tmp_path: 
         assert [entry.record_id for entry in await library.tag_history("oat-pmc")] == [one.id, two.id, None]
         with pytest.raises(SetTagError):
             await library.tag(one.id, Tag.AS_LEFT, "eva")
+
+
+async def test_a_set_with_unread_objects_is_never_golden(tmp_path: Path) -> None:
+    partial_set = replace(at("2026-03-04T00:00:00Z"), unread={Address(0x6065): "no_answer"})
+    async with library_in(tmp_path) as (library, _store):
+        (record,) = await library.put([partial_set], Source.BACKUP)
+        with pytest.raises(SetIncompleteError) as caught:
+            await library.tag(record.id, Tag.GOLDEN, "eva")
+        assert caught.value.details == {"set": record.id, "tag": "golden", "unread": 1}
+        assert await tagged_ids(library, Tag.GOLDEN) == set()
+        await library.tag(record.id, Tag.AS_DELIVERED, "eva")
+        assert await tagged_ids(library, Tag.AS_DELIVERED) == {record.id}
 
 
 async def tagged_ids(library: Library, tag: Tag) -> set[str]:

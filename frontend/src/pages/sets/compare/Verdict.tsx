@@ -20,7 +20,7 @@ export function sentenceOf(summary: Summary, t: Translate): string {
 /** The one sentence that sums up, with a sign that is seen first. */
 export function Verdict({ summary }: { summary: Summary }) {
   const t = useTexts();
-  const gaps = summary.missing + summary.not_comparable + summary.unread;
+  const gaps = summary.missing + summary.not_comparable + summary.unread + summary.undescribed_different;
   const equal = summary.different === 0;
   const Icon = !equal ? IconEqualNot : gaps > 0 ? IconAlertTriangle : IconCircleCheck;
   const tone = equal && gaps === 0 ? "tone-ok" : "tone-warning";
@@ -36,6 +36,19 @@ export function Verdict({ summary }: { summary: Summary }) {
             {t(summary.unread === 1 ? "page.compare.sum.unread_one" : "page.compare.sum.unread", {
               count: summary.unread,
             })}
+          </small>
+        )}
+        {summary.undescribed > 0 && (
+          <small>
+            {" "}
+            ·{" "}
+            {t(
+              summary.undescribed === 1 ? "page.compare.sum.undescribed_one" : "page.compare.sum.undescribed",
+              {
+                count: summary.undescribed,
+                different: summary.undescribed_different,
+              },
+            )}
           </small>
         )}
       </span>

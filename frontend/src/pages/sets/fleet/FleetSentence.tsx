@@ -1,4 +1,4 @@
-import { IconCircleCheck, IconEqualNot } from "@tabler/icons-react";
+import { IconAlertTriangle, IconCircleCheck, IconEqualNot } from "@tabler/icons-react";
 import type { FleetDoc } from "../../../api/fleet";
 import { useTexts } from "../../../texts/texts";
 import { dateAndTime } from "../../../ui/format";
@@ -9,18 +9,23 @@ import classes from "./Fleet.module.css";
 export function FleetSentence({ doc }: { doc: FleetDoc }) {
   const t = useTexts();
   const nameOf = useFleetDevice();
-  const { golden, total, equal, parameters, foreign } = doc;
-  const odd = total - equal;
-  const Icon = odd > 0 ? IconEqualNot : IconCircleCheck;
+  const { golden, total, different: odd, incomplete, parameters, foreign } = doc;
+  const equal = odd === 0 && incomplete === 0;
+  const Icon = odd > 0 ? IconEqualNot : equal ? IconCircleCheck : IconAlertTriangle;
   const when = golden.t_ns === null ? "–" : dateAndTime(golden.t_ns / 1e6);
   return (
     <div className={classes.sentence} role="status" data-testid="fleet-sentence">
-      <Icon size={24} className={odd > 0 ? "tone-warning" : "tone-ok"} aria-hidden />
+      <Icon size={24} className={equal ? "tone-ok" : "tone-warning"} aria-hidden />
       <strong>
         {total === 0
           ? t("page.fleet.no_devices")
           : t(odd === 1 ? "page.fleet.sentence_one" : "page.fleet.sentence", { odd, total, parameters })}
       </strong>
+      {incomplete > 0 && (
+        <span className="tone-warning" data-testid="fleet-incomplete">
+          {t(incomplete === 1 ? "page.fleet.incomplete_one" : "page.fleet.incomplete", { count: incomplete })}
+        </span>
+      )}
       <span className="dim">{t("page.fleet.against", { device: nameOf(golden.device), when })}</span>
       {foreign.length > 0 && (
         <span className="tone-warning" title={foreign.map((one) => one.device).join("\n")}>

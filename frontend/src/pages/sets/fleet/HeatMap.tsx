@@ -72,15 +72,39 @@ function groupColumns(
     title: names.group(id),
     width: CELL,
     numeric: true,
-    text: (one) => `${one.by_group[at] ?? 0}`,
+    text: (one) => countText(one.by_group[at] ?? 0, one.missing_by_group[at] ?? 0),
     by: (one) => one.by_group[at] ?? 0,
-    cell: (one) => <Shade count={one.by_group[at] ?? 0} most={most} onOpen={() => open(one, id)} />,
+    cell: (one) => (
+      <Shade
+        count={one.by_group[at] ?? 0}
+        missing={one.missing_by_group[at] ?? 0}
+        most={most}
+        onOpen={() => open(one, id)}
+      />
+    ),
   }));
   return [total, ...groups];
 }
 
+/** Differences, and how many parameters are missing: of those, nothing is known, which is no 0. */
+function countText(count: number, missing: number): string {
+  if (missing === 0) return `${count}`;
+  return count === 0 ? `∅ ${missing}` : `${count} · ∅ ${missing}`;
+}
+
 /** By keyboard, Enter on the row opens all groups; the pointer has the group at once. */
-function Shade({ count, most, onOpen }: { count: number; most: number; onOpen: () => void }) {
+function Shade({
+  count,
+  missing,
+  most,
+  onOpen,
+}: {
+  count: number;
+  missing: number;
+  most: number;
+  onOpen: () => void;
+}) {
+  const t = useTexts();
   const percent = count === 0 ? 0 : 8 + (count / most) * (DEEPEST - 8);
   return (
     <button
@@ -91,10 +115,12 @@ function Shade({ count, most, onOpen }: { count: number; most: number; onOpen: (
         event.stopPropagation();
         onOpen();
       }}
-      data-zero={count === 0}
+      data-zero={count === 0 && missing === 0}
+      data-missing={missing > 0}
+      title={missing > 0 ? `${missing} ${t("page.fleet.mark.missing")}` : undefined}
       style={{ background: `color-mix(in srgb, var(--hs-warn) ${percent.toFixed(0)}%, transparent)` }}
     >
-      {count}
+      {countText(count, missing)}
     </button>
   );
 }
