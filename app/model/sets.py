@@ -20,6 +20,7 @@ from app.model.datatypes import Raw
 from app.model.strict_json import JsonError, line_of, read_json
 
 FORMAT: Final = "hubside-set/1"
+MAX_NODE: Final = 0xFFFF
 _EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)
 _PARTS: Final = frozenset(
     ("format", "hash", "complete", "description", "empty", "identity", "origin", "unread", "values")
@@ -231,15 +232,18 @@ class _Reader:
         self._known("origin", part, Origin)
         for one in fields(Origin):
             if one.name == "node":
-                if isinstance(part.get("node"), bool) or not isinstance(part.get("node"), int):
-                    raise JsonError(self._line("origin", "node"), "node is no number")
+                node = part.get("node")
+                if isinstance(node, bool) or not isinstance(node, int) or not 0 <= node <= MAX_NODE:
+                    raise JsonError(self._line("origin", "node"), f"node is no number from 0 to {MAX_NODE}")
             elif one.name in part or one.name != "work_order":
                 self._text_of("origin", one.name, part.get(one.name))
         origin = Origin(**part)
         try:
-            _ = origin.t_ns
+            known = 0 <= origin.t_ns < 1 << 63
         except (ValueError, OverflowError) as error:
             raise JsonError(self._line("origin", "time"), f"'{origin.time}' is no time") from error
+        if not known:
+            raise JsonError(self._line("origin", "time"), f"'{origin.time}' is no time from 1970 to 2262")
         return origin
 
     def _empty(self, content: dict[str, Any]) -> tuple[Address, ...]:
@@ -278,6 +282,8 @@ class _Reader:
     def _text_of(self, part: str, key: str, value: Any) -> str:
         if not isinstance(value, str):
             raise JsonError(self._line(part, key), f"'{key}' in '{part}' is missing or no text")
+        if not value.isprintable() and any(0xD800 <= ord(one) < 0xE000 for one in value):
+            raise JsonError(self._line(part, key), f"'{key}' in '{part}' is a text that is none: half a character")
         return value
 
     def _address(self, part: str, key: str) -> Address:

@@ -105,6 +105,10 @@ def test_an_instant_is_written_as_it_is_read(text: str, t_ns: int) -> None:
         ('"node": 1', '"node": "1"', '"node"', "no number"),
         ('"person": "A. Technician",', "", '"origin"', "missing"),
         ("2026-03-04T14:03:21Z", "yesterday", '"time"', "no time"),
+        ("2026-03-04T14:03:21Z", "9999-12-31T00:00:00Z", '"time"', "1970 to 2262"),
+        ("2026-03-04T14:03:21Z", "1914-12-31T00:00:00Z", '"time"', "1970 to 2262"),
+        ('"node": 1', '"node": 70000', '"node"', "from 0 to"),
+        ('"person": "A. Technician"', '"person": "\\ud800"', '"person"', "half a character"),
         ('"PMM"', '"\\ud800"', "{", "text"),
     ],
 )

@@ -18,8 +18,11 @@ EFC_TARGET: Final = pmc("567A")
 EFC_VELOCITY: Final = pmc("5681")
 EFC_ACCELERATION: Final = pmc("5683")
 EFC_DECELERATION: Final = pmc("5684")
+MAXIMUM_ACCELERATION: Final = pmc("60C5")
+MAXIMUM_DECELERATION: Final = pmc("60C6")
 SHORTEST_HOLD_UP_MS: Final = 3000
 _TRAVEL: Final = (EFC_TARGET, EFC_VELOCITY, EFC_ACCELERATION, EFC_DECELERATION, LOWER_LIMIT, MAXIMUM_VELOCITY)
+_RAMPS: Final = (MAXIMUM_ACCELERATION, MAXIMUM_DECELERATION)
 
 
 def _hold_up(look: Look) -> Iterator[Found]:
@@ -30,13 +33,23 @@ def _hold_up(look: Look) -> Iterator[Found]:
 
 def _shut_down(look: Look) -> Iterator[Found]:
     hold_up_ms, shut_down_s = look(HOLD_UP, SHUT_DOWN)
-    travel_s = travel_time_s(*look(*_TRAVEL))
+    target, velocity, acceleration, deceleration, lowest, maximum = look(*_TRAVEL)
+    steepest, steepest_down = look(*_RAMPS)
+    braking = deceleration if deceleration > 0 else acceleration
+    travel_s = travel_time_s(
+        target, velocity, min(acceleration, steepest), _limited(braking, steepest_down), lowest, maximum
+    )
     if travel_s is None:
         return  # without velocity or ramp there is no travel: oat.efc_values tells
     needed_s = hold_up_ms / 1000 + travel_s
     if shut_down_s < needed_s:
         details = {"shut_down_s": shut_down_s, "hold_up_s": hold_up_ms / 1000, "travel_s": round(travel_s, 1)}
         yield Found((SHUT_DOWN, HOLD_UP, EFC_TARGET, EFC_VELOCITY), {**details, "needed_s": math.ceil(needed_s)})
+
+
+def _limited(deceleration: int, most: int) -> int:
+    """60C6h = 0, its default, limits nothing: taken so, for no axis could stop else."""
+    return min(deceleration, most) if most > 0 else deceleration
 
 
 def travel_time_s(
@@ -58,5 +71,5 @@ def travel_time_s(
 
 RULES: Final[tuple[Rule, ...]] = (
     make_rule("oat.hold_up_time", "4.2.1.4", Severity.WARNING, (HOLD_UP,), _hold_up),
-    make_rule("oat.shut_down_time", "4.2.1.5", Severity.ERROR, (SHUT_DOWN, HOLD_UP, *_TRAVEL), _shut_down),
+    make_rule("oat.shut_down_time", "4.2.1.5", Severity.ERROR, (SHUT_DOWN, HOLD_UP, *_TRAVEL, *_RAMPS), _shut_down),
 )

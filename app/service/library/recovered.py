@@ -17,6 +17,7 @@ from typing import Any, Final
 from app import __version__
 from app.errors import RecordingError
 from app.model.address import Address
+from app.model.checks import RESTORE_DEFAULTS, STORE_PARAMETERS
 from app.model.datatypes import Raw
 from app.model.description import Description
 from app.model.sets import Origin, ParameterSet, identity_of, iso_time
@@ -30,6 +31,8 @@ from app.wire.sdo import Abort
 
 NOT_SEEN: Final = "not seen"
 UNFINISHED: Final = "write not finished"
+_COMMANDS: Final = (STORE_PARAMETERS, RESTORE_DEFAULTS)
+"""What is written there is an order, and no value that stands anywhere."""
 _GAPS: Final = frozenset({EventKind.FRAMES_LOST, EventKind.GAP, EventKind.BUS_LOST})
 
 
@@ -93,6 +96,8 @@ class _Node:
     def take(self, record: SdoSeen) -> None:
         """One finished transfer."""
         address = record.address
+        if record.access is SdoAccess.WRITE and address.major in _COMMANDS:
+            return
         if record.outcome is Outcome.DONE and record.data is not None:
             self._forget(address)
             self.values[address] = record.data

@@ -106,14 +106,21 @@ class Desk:
 
     async def latest(self, turbine: str | None = None, limit: int = 100) -> list[RestoreRow]:
         """Restores, newest first."""
-        return await self._store.run(lambda connection: rows.list_restores(connection, turbine, limit))
+        found = await self._store.run(lambda connection: rows.list_restores(connection, turbine, limit))
+        return [self._as_it_is(row) for row in found]
 
     async def get(self, restore_id: str) -> Kept:
         """One restore. Raises RestoreUnknownError."""
         found = await load(self._store, restore_id)
         if found is None:
             raise RestoreUnknownError(restore=restore_id)
-        return found
+        return replace(found, row=self._as_it_is(found.row))
+
+    def _as_it_is(self, row: RestoreRow) -> RestoreRow:
+        """A restore that nobody works on is incomplete, whatever a store that could not be written says of it."""
+        if row.state.ended or self.at_work(row.id) is not None:
+            return row
+        return replace(row, state=RestoreState.INCOMPLETE)
 
     def at_work(self, restore_id: str) -> Transaction | None:
         """The restore while it is worked on."""
@@ -362,7 +369,11 @@ class Desk:
 
     async def _keep(self, found: Survey, reason: str, person: str, source: Source) -> list[SetRecord]:
         """Sets go to the library; a store that fails holds up no restore."""
-        own = [replace(one, origin=replace(one.origin, reason=reason, person=person)) for one in found.sets.values()]
+        library = self._office.library
+        own = [
+            library.identified(replace(one, origin=replace(one.origin, reason=reason, person=person)))
+            for one in found.sets.values()
+        ]
         try:
             return await self._office.library.put(own, source)
         except StoreError:

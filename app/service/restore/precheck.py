@@ -85,17 +85,19 @@ def is_same_unit(of_set: Identity, device: Identity, nameplate: str | None) -> b
     """True where it is proven that a set comes from this very device.
 
     By the serial number that the device tells; where it tells none, by the nameplate that a person typed and confirmed.
+    A serial number of 0 is none (CiA 301, 7.5.2.19), and one number is given again by another maker and product.
     """
     if is_contradictory(of_set, device, nameplate):
         return False
-    if of_set.serial is not None and device.serial is not None:
-        return of_set.serial == device.serial and not _differ(of_set.vendor_id, device.vendor_id)
+    if of_set.serial and device.serial:
+        makers = _differ(of_set.vendor_id, device.vendor_id) or _differ(of_set.product_code, device.product_code)
+        return of_set.serial == device.serial and not makers
     return nameplate is not None and of_set.nameplate == nameplate
 
 
 def is_contradictory(of_set: Identity, device: Identity, nameplate: str | None) -> bool:
     """True where serial number and nameplate say different things: one was exchanged since, or mistyped."""
-    if of_set.nameplate is None or nameplate is None or of_set.serial is None or device.serial is None:
+    if of_set.nameplate is None or nameplate is None or not of_set.serial or not device.serial:
         return False
     return (of_set.nameplate == nameplate) != (of_set.serial == device.serial)
 
@@ -108,9 +110,11 @@ def objections_to_state(found: Survey) -> Iterator[Refusal]:
         if STATUSWORD in report.target.description.entries:
             yield from _objections_to_drive(report.target, values, status)
         main, supply = values.get(PMM_STATUS), values.get(SUPPLY_STATUS)
+        entries = report.target.description.entries
+        unknown = [a for a in (PMM_STATUS, SUPPLY_STATUS) if a in entries and not isinstance(values.get(a), int)]
         if isinstance(main, int) and main & _BATTERY:
             yield Refusal(Objection.BATTERY, slug, {"status": f"{main:04X}h"})
-        if (isinstance(main, int) and main & _MAINS) or (isinstance(supply, int) and supply & _24_VOLT):
+        if unknown or (isinstance(main, int) and main & _MAINS) or (isinstance(supply, int) and supply & _24_VOLT):
             yield Refusal(Objection.SUPPLY, slug, {"status": f"{main:04X}h" if isinstance(main, int) else "–"})
 
 
@@ -120,6 +124,8 @@ def _objections_to_drive(target: Target, values: Mapping[Address, Raw], status: 
     elif stage_on(status):
         yield Refusal(Objection.DRIVE_ENABLED, target.slug, {"status": f"{status:04X}h"})
     speed = _scaled(target, VELOCITY, values)
+    if speed is None and VELOCITY in target.description.entries and isinstance(status, int):
+        yield Refusal(Objection.DRIVE_UNKNOWN, target.slug)
     if speed is not None and abs(speed) > STANDSTILL_DPS:
         yield Refusal(Objection.DRIVE_MOVING, target.slug, {"speed": f"{speed:.2f}"})
 

@@ -129,6 +129,16 @@ class Hands:
                     raise Broken(Cause.DRIVE_ENABLED, target.slug)
                 await asyncio.sleep(LOOK_S)
 
+    async def _not_feathered(self, slug: str) -> None:
+        """A FEATHER that somebody has sent is not cut short by a restart: it stands in the controlword."""
+        for target in self.targets.values():
+            if CONTROLWORD not in target.description.entries:
+                continue
+            word = await self._integer(target, CONTROLWORD)
+            if word is not None and word & _FEATHER:
+                self._log.ended(StepState.FAILED)
+                raise Broken(Cause.DRIVE_ENABLED, slug)
+
     async def _integer(self, target: Target, address: Address) -> int | None:
         try:
             return await read_integer(self.connection, target, address)
@@ -267,6 +277,7 @@ class Hands:
         await self._still()
         self.look_for_restarts()
         await self._log.intend(direction, StepKind.RESTART, slug)
+        await self._not_feathered(slug)
         before = boots_of(target)
         driver, stamper = self.connection.driver(target), self.connection.stamper
         try:

@@ -210,16 +210,20 @@ class Transaction:
     async def _go(self, steps: Sequence[Step], direction: Direction, confirm_s: float | None) -> End:
         goals = self._terms.wanted(direction)
         self.done, self.total = 0, len(steps)
-        checked = False
+        checked = restarting = False
         for step in steps:
             self._look_for_people(direction)
             if step.kind is StepKind.SAVE and not checked:
                 await self._hands.check(goals)
                 checked = True
+            if step.kind is StepKind.RESTART and not restarting:
+                await self._hands.guard()  # of its own chain: from the first restart on, that may drive the axis
+                restarting = True
             await self._enter_for(step, direction)
             await self._do(step, direction, confirm_s)
             self.done += 1
         await self._prove(steps, goals, direction)
+        self._look_for_people(direction)
         saved = {step.device for step in steps if step.kind is StepKind.SAVE}
         restarted = {step.device for step in steps if step.kind is StepKind.RESTART}
         proven = bool(saved) and saved <= restarted

@@ -85,6 +85,9 @@ def test_the_same_unit_is_known_by_its_serial_number_else_by_its_nameplate() -> 
     assert not is_same_unit(Identity(), Identity(), None)
     assert not is_same_unit(Identity(serial=7, nameplate="A"), Identity(serial=7), "B"), "they contradict each other"
     assert not is_same_unit(Identity(serial=7, vendor_id=1), Identity(serial=7, vendor_id=2), None)
+    assert not is_same_unit(Identity(serial=7, product_code=1), Identity(serial=7, product_code=2), None)
+    assert not is_same_unit(Identity(serial=0), Identity(serial=0), None), "0 is no number"
+    assert is_same_unit(Identity(serial=0, nameplate="A"), Identity(serial=0), "A")
 
 
 async def test_values_of_another_unit_stay_where_they_are(bench: Bench) -> None:

@@ -11,7 +11,9 @@ import pytest
 from app.errors import RestoreChangedError, RestoreOpenError, RestoreStateError
 from app.model.address import parse_address
 from app.model.fault import FaultOrder
+from app.service.journal import Entry, Kind
 from app.service.restore.order import Cause
+from app.service.restore.survey import boots_of
 from app.service.restore.transaction import End
 from app.service.save import restart, save
 from app.service.stop import Command, command_all
@@ -274,6 +276,26 @@ async def test_an_axis_that_is_driven_meanwhile_ends_the_writing(bench: Bench) -
     assert await bench.desk.wait(restore_id) is End.NEW
 
 
+async def test_a_feather_is_not_cut_short_by_a_restart(bench: Bench) -> None:
+    """Whoever has sent a FEATHER keeps it: no device of the station is restarted while it stands in the controlword."""
+    connection = bench.connection
+    boots = [boots_of(target) for target in connection.targets]
+    sending: list[asyncio.Future[object]] = []
+
+    def feather_after_the_last_save(entry: Entry) -> None:
+        if entry.kind is Kind.SAVED and entry.device == PMC:
+            command = command_all(connection.axes(), Command.FEATHER, connection.journal, connection.stamper)
+            sending.append(asyncio.ensure_future(command))
+
+    connection.journal.listen(feather_after_the_last_save)
+    restore_id = await bench.begin(restart=True)
+    assert await bench.desk.wait(restore_id) is End.INCOMPLETE
+    assert sending and await sending[0]
+    kept = await bench.desk.get(restore_id)
+    assert kept.outcome["cause"] == Cause.DRIVE_ENABLED.value
+    assert [boots_of(target) for target in connection.targets] == boots
+
+
 async def test_another_masters_write_is_not_saved(bench: Bench) -> None:
     restore_id = await bench.begin(confirm_s=30.0)
     await bench.until_state(restore_id, RestoreState.AWAITING_CONFIRMATION)
@@ -328,7 +350,7 @@ async def test_a_store_that_fails_stops_the_writing_at_once(bench: Bench) -> Non
     with pytest.raises(RestoreOpenError):
         target = bench.connection.target(PMM)
         await save(bench.connection.driver(target), target, bench.connection.journal, bench.connection.stamper)
-    bench.desk = bench.another_desk()
+    assert (await bench.desk.get(restore_id)).row.state is RestoreState.INCOMPLETE, "whatever the store still says"
     await bench.desk.resume(bench.connection, restore_id, "Anna")
     assert await bench.desk.wait(restore_id) is End.NEW
 

@@ -70,6 +70,7 @@ function freshSets(facts: Facts): number {
     facts.sets?.some(
       (one) =>
         one.origin.device === device.slug &&
+        one.source === "backup" &&
         one.unread === 0 &&
         facts.nowMs - one.t_ns / 1e6 < FRESH_BACKUP_MS,
     ),
