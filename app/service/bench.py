@@ -5,13 +5,13 @@ from __future__ import annotations
 import asyncio
 import logging
 import time
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Iterable
 from dataclasses import replace
 from typing import Final
 
-from app.errors import BusLostError, HubsideError, NotConnectedError, StoreError
-from app.service.as_found import REASON, read_as_found, unreachable
-from app.service.backup import to_set
+from app.errors import HubsideError, NotConnectedError, StoreError
+from app.service.as_found import REASON, is_whole, look, unreachable, until_back
+from app.service.backup import ReadReport, whole_sets
 from app.service.bitrates import with_bitrates
 from app.service.connection import Connection
 from app.service.instructor import Instructor, InstructorDesk
@@ -193,24 +193,33 @@ class Bench:
             await asyncio.gather(self._look, return_exceptions=True)
             self._look = None
 
+    async def keep_found(self, reports: Iterable[ReadReport], person: str, looked: bool | None = None) -> None:
+        """Keep what was read whole as found, of devices of which nothing was kept before in this visit.
+
+        ``looked``: what is known now of the first look; None where the reports are not of it.
+        """
+        connection, visits = self.connection, self.office.visits
+        if connection is None or visits.current is None:
+            return
+        read = [report for report in reports if is_whole(report)]
+        slug, order, now_ns = connection.turbine.slug, visits.current.work_order, self._clocks[0]()
+        whole = whole_sets(read, slug, person, REASON, now_ns, order)
+        found = [self.office.library.identified(one) for one in whole]
+        await self._keep(visits.keep_found(found, visits.looked if looked is None else looked))
+
     async def _first_look(self, connection: Connection, person: str) -> None:
-        """Read everything once, then keep polling what the screens need."""
-        try:
-            reports = await read_as_found(connection, person)
-        except* BusLostError as lost:
-            for reason in lost.exceptions:
-                if isinstance(reason, BusLostError):
-                    self._told(reason)
-        else:
-            for error in unreachable(reports).values():
-                self._told(error)
-            slug, now_ns = connection.turbine.slug, self._clocks[0]()
-            order = "" if self.office.visits.current is None else self.office.visits.current.work_order
-            whole = [to_set(report, slug, person, REASON, now_ns, order) for report in reports if report.values]
-            found = [self.office.library.identified(one) for one in whole]
-            await self._keep(self.office.visits.keep_found(found))
+        """Read everything once, then keep polling what the screens need. What did not answer is read once it does."""
+        reports, missing = await look(connection, person, connection.targets)
+        for error in unreachable(reports):
+            self._told(error)
+        await self.keep_found(reports, person, not any(one.lost for one in missing))
         poller = Poller(connection, lambda: self.polling.plan)
         try:
+            while missing:
+                back = await until_back(connection, missing)
+                reports, again = await look(connection, person, [one.target for one in back])
+                missing = [*(one for one in missing if one not in back), *again]
+                await self.keep_found(reports, person, not any(one.lost for one in missing))
             await asyncio.Event().wait()
         finally:
             await poller.close()

@@ -48,6 +48,17 @@ async def connect(page: httpx.AsyncClient) -> None:
     assert (await page.post("/api/live/connect", json={"turbine": "wtg-07"})).is_success
 
 
+async def all_read(page: httpx.AsyncClient) -> None:
+    """Wait until every parameter is known."""
+
+    async def unread() -> int:
+        return sum(one["unread"] for one in (await page.get("/api/live/visit/left")).json())
+
+    async with asyncio.timeout(2 * DEADLINE_S):
+        while await unread():  # noqa: ASYNC110  it is asked for
+            await asyncio.sleep(0.05)
+
+
 async def ready(page: httpx.AsyncClient) -> dict[str, object]:
     """The comparison, once the devices are read."""
 
@@ -71,6 +82,7 @@ async def test_a_visit_from_connecting_to_its_end(page: httpx.AsyncClient) -> No
     assert (await page.get(SINCE)).json()["state"] == "no-earlier-visit"
     changed = await page.patch("/api/live/visit", json={"work_order": "WO-3"})
     assert changed.json()["work_order"] == "WO-3"
+    await all_read(page)
     ended = (await page.post("/api/live/visit/end", json={"reason": "noise", "work_order": "WO-3"})).json()
     assert (ended["id"], ended["reason"], ended["left_open"]) == (visit["id"], "noise", False)
     assert ended["ended_ns"] > ended["started_ns"]

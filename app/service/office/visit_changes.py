@@ -92,9 +92,9 @@ async def changes_since_last_visit(visits: Visits, audit: AuditLog, targets: Ite
         return VisitChanges(Progress.NO_EARLIER_VISIT, None)
     visit, then = earlier
     now = await visits.sets(present, Phase.FOUND)
-    if not now and not visits.looked:
-        return VisitChanges(Progress.READING, visit)
     devices = list(targets)
+    if not visits.looked and any(target.slug not in now for target in devices):
+        return VisitChanges(Progress.READING, visit)
     left = bool(await visits.sets(visit, Phase.LEFT))
     ended = left and not visit.left_open and visit.ended_ns is not None
     since_ns = visit.ended_ns if ended and visit.ended_ns is not None else visit.started_ns

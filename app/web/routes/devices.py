@@ -13,7 +13,7 @@ from app.service.jobs import Job
 from app.service.save import restart, save
 from app.service.views import raw_from_json, raw_to_json
 from app.service.write import write_raw
-from app.web.deps import DEVICE, ConnectionOf, JobsOf, JournalOf, PersonOf, TargetOf, needs
+from app.web.deps import DEVICE, BenchOf, ConnectionOf, JobsOf, JournalOf, PersonOf, TargetOf, needs
 from app.web.models import JobDoc, Nothing, ReadRequest, RestartDone, SaveDone, WriteDone, WriteRequest
 from app.web.routes.jobs import job_doc
 
@@ -21,7 +21,9 @@ router = APIRouter(dependencies=[needs(Role.TECHNICIAN)])
 
 
 @router.post(f"{DEVICE}/read")
-async def read(connection: ConnectionOf, jobs: JobsOf, target: TargetOf, request: ReadRequest) -> JobDoc:
+async def read(
+    bench: BenchOf, connection: ConnectionOf, jobs: JobsOf, person: PersonOf, target: TargetOf, request: ReadRequest
+) -> JobDoc:
     """Read objects in the background; their values come by the socket."""
     wanted = None if request.addresses is None else [parse_address(text) for text in request.addresses]
     for address in wanted or ():
@@ -33,6 +35,8 @@ async def read(connection: ConnectionOf, jobs: JobsOf, target: TargetOf, request
 
         job.total = len(readable(target.description) if wanted is None else wanted)
         report = await read_device(connection.driver(target), target, wanted, progress)
+        if wanted is None:
+            await bench.keep_found([report], person.person)
         job.failed = [(address.short, error) for address, error in report.failed.items()]
         job.done = job.total
 

@@ -224,6 +224,7 @@ async def backup(
         order = "" if visit is None else visit.work_order
         library = bench.office.library
         whole = whole_sets(reports, slug, person.person, given.reason, time.time_ns(), order)
+        await bench.keep_found(reports, person.person)
         found = [library.identified(one) for one in whole]
         await library.put(found, Source.BACKUP)
         if folder is not None:

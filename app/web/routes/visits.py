@@ -55,7 +55,7 @@ async def left_now(bench: BenchOf, connection: ConnectionOf) -> list[LeftNow]:
     turbine, person = connection.turbine.slug, bench.options.person
     found = []
     for target in connection.targets:
-        known = as_known(target, turbine, person, bench.stamper())
+        known = as_known(target, turbine, person, bench.stamper(), found=bench.office.visits.found.get(target.slug))
         parameters = [entry.address for entry in target.description if entry.is_parameter]
         reasons = [known.unread[address] for address in parameters if address in known.unread]
         stale = reasons.count(STALE)
