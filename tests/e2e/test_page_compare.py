@@ -61,10 +61,10 @@ class Home:
         key = self.record(device)["id"]
         return self.page.request.get(f"{self.address}api/sets/{key}/download").text()
 
-    def take(self, device: str, **changes: Any) -> str:
+    def take(self, device: str, far: str = "wtg-99", **changes: Any) -> str:
         """Import the set of a device with ``changes``, as of a turbine far away; gives the record's id."""
         found = load_set(self.download(device), "downloaded.json")
-        origin = replace(found.origin, turbine="wtg-99", device="wtg-99/blade-1/pmm")
+        origin = replace(found.origin, turbine=far, device=f"{far}/blade-1/pmm")
         data = base64.b64encode(dump_set(replace(found, origin=origin, **changes)).encode()).decode()
         taken = self.ask("POST", "/api/sets/import", {"name": "far.json", "data": data})
         return str(taken["record"]["id"])
@@ -208,7 +208,7 @@ def test_a_file_is_put_into_a_column_and_a_bad_column_can_be_taken_out(home: Hom
     file = tmp_path / "blade-2.json"
     file.write_text(home.download(TWO))
     home.go(f"tab=compare&columns=live:{TWO},golden:{TWO}")
-    expect(page.get_by_test_id("problem")).to_contain_text("No golden set")
+    expect(page.get_by_test_id("no-golden")).to_contain_text("marked golden yet")
     page.get_by_test_id(f"take-out-golden:{TWO}").click()
     expect(page.get_by_text("Choose one more column.")).to_be_visible()
     page.get_by_test_id("column-upload").set_input_files(file)
@@ -237,7 +237,7 @@ def test_the_odd_blade_is_named_and_followed_live(home: Home) -> None:
 def test_a_fleet_is_ranked_against_a_chosen_set_and_leads_to_the_comparison(home: Home) -> None:
     page = home.page
     home.go("tab=fleet")
-    expect(page.get_by_test_id("problem")).to_contain_text("No golden set")
+    expect(page.get_by_test_id("no-golden")).to_contain_text("marked golden yet")
     golden = home.take(ONE, values={**home.values(ONE), LIMIT: 520})
     home.go(f"tab=fleet&golden=oat-pmm:{golden}")
     expect(page.get_by_test_id("fleet-sentence")).to_contain_text("3 of 4 devices differ")
@@ -250,6 +250,18 @@ def test_a_fleet_is_ranked_against_a_chosen_set_and_leads_to_the_comparison(home
     page.keyboard.press("Enter")
     expect(page).to_have_url(re.compile(f"tab=compare.*columns=set:{golden},set:"))
     expect(cell(page, "3110:01", 1)).to_contain_text("−2.0")
+
+
+def test_a_fragment_is_shown_as_such_and_not_as_equal(home: Home) -> None:
+    page = home.page
+    few = {address: raw for address, raw in home.values(ONE).items() if address != LIMIT}
+    home.take(ONE, far="wtg-98", values=few, unread={LIMIT: "no_answer"})
+    home.go(f"tab=fleet&golden=oat-pmm:{home.record(ONE)['id']}")
+    expect(page.get_by_test_id("fleet-incomplete")).to_have_text("1 set is incomplete: what it lacks is not compared")
+    page.get_by_test_id("fleet-view").get_by_text("Heat map").click()
+    row = page.get_by_test_id("fleet-wtg-98/blade-1/pmm")
+    expect(row.locator("[data-column='group-temperatures']")).to_have_text("∅ 1")
+    expect(row.locator("[data-column='group-mains']")).to_have_text("0")
 
 
 def test_a_comparison_is_exported_in_the_language_of_the_page(home: Home) -> None:

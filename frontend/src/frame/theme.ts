@@ -46,6 +46,8 @@ export const theme = createTheme({
         header: { background: PANEL },
       },
     },
+    // A name needs a role to be read out.
+    Loader: { defaultProps: { role: "status" } },
     Tooltip: { defaultProps: { openDelay: 300, withArrow: true, multiline: true, maw: 340 } },
   },
 });

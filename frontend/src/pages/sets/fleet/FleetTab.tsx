@@ -59,7 +59,11 @@ export function FleetTab() {
         )}
       </div>
       {kind === "" && <p>{t("page.fleet.nothing_known")}</p>}
-      {unmarked && <p className={room.note}>{t("page.fleet.no_golden", { name: kindName })}</p>}
+      {unmarked && (
+        <p className={room.note} data-testid="no-golden">
+          {t("page.fleet.no_golden", { name: kindName })}
+        </p>
+      )}
       {query.isError && !unmarked && <ProblemAlert error={query.error} title={t("page.fleet.failed")} />}
       {doc && !query.isError && (
         <>
