@@ -208,7 +208,7 @@ def test_a_file_is_put_into_a_column_and_a_bad_column_can_be_taken_out(home: Hom
     file = tmp_path / "blade-2.json"
     file.write_text(home.download(TWO))
     home.go(f"tab=compare&columns=live:{TWO},golden:{TWO}")
-    expect(page.get_by_test_id("problem")).to_contain_text("No golden set")
+    expect(page.get_by_test_id("no-golden")).to_contain_text("marked golden yet")
     page.get_by_test_id(f"take-out-golden:{TWO}").click()
     expect(page.get_by_text("Choose one more column.")).to_be_visible()
     page.get_by_test_id("column-upload").set_input_files(file)
@@ -237,7 +237,7 @@ def test_the_odd_blade_is_named_and_followed_live(home: Home) -> None:
 def test_a_fleet_is_ranked_against_a_chosen_set_and_leads_to_the_comparison(home: Home) -> None:
     page = home.page
     home.go("tab=fleet")
-    expect(page.get_by_test_id("problem")).to_contain_text("No golden set")
+    expect(page.get_by_test_id("no-golden")).to_contain_text("marked golden yet")
     golden = home.take(ONE, values={**home.values(ONE), LIMIT: 520})
     home.go(f"tab=fleet&golden=oat-pmm:{golden}")
     expect(page.get_by_test_id("fleet-sentence")).to_contain_text("3 of 4 devices differ")
