@@ -208,7 +208,7 @@ def test_a_file_is_put_into_a_column_and_a_bad_column_can_be_taken_out(home: Hom
     file = tmp_path / "blade-2.json"
     file.write_text(home.download(TWO))
     home.go(f"tab=compare&columns=live:{TWO},golden:{TWO}")
-    expect(page.get_by_test_id("no-golden")).to_contain_text("marked golden yet")
+    expect(page.get_by_test_id("problem")).to_contain_text("No golden set")
     page.get_by_test_id(f"take-out-golden:{TWO}").click()
     expect(page.get_by_text("Choose one more column.")).to_be_visible()
     page.get_by_test_id("column-upload").set_input_files(file)
