@@ -60,7 +60,7 @@ def _tune_velocity_loop(store: ObjectStore, plant: AxisPlant) -> None:
     p[k.FILTER] = 1 - exp(-k.CYCLE_S / filter_s)
     slower = _BLADE_SHARE if p[k.SPEED_SOURCE] == k.BLADE_ENCODER else 1.0
     p[k.VELOCITY_P] = usual * slower * store.number(0x60F9, 1) / _VELOCITY_GAIN
-    p[k.VELOCITY_I] = usual * slower**2 / _VELOCITY_RESET_S * store.number(0x60F9, 2) / _VELOCITY_INTEGRAL
+    p[k.VELOCITY_I] = usual * slower / _VELOCITY_RESET_S * store.number(0x60F9, 2) / _VELOCITY_INTEGRAL
     p[k.VELOCITY_D] = usual * _DIFFERENTIAL_S / filter_s * store.number(0x60F9, 3) / _VELOCITY_DIFFERENTIAL
 
 
