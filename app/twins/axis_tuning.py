@@ -22,9 +22,10 @@ _CURRENT_GAIN, _CURRENT_INTEGRAL = 16, 512
 """60F9h and 60F6h hold gains without units. With their defaults (for the differential share that is 0) the loops get
 these time constants: current 2 ms, velocity 10 ms, its integral 100 ms, as a drive of this size is tuned (estimate);
 other values change the gains in proportion."""
-_BLADE_SHARE: Final = 0.125
+_BLADE_GAIN, _BLADE_INTEGRAL = 0.125, 0.035
 """OPEN: how an axis is tuned that runs by its blade encoder. Play and twist of the gear lie between motor and encoder
-then; with the full gains the axis would swing between the limits of its current. The loop is made slower by so much."""
+then; with the full gains the axis would swing between the limits of its current. Gain and integral are made smaller by
+so much: well damped, and a stop takes half a second."""
 _DIFFERENTIAL_S: Final = 0.001
 _LONGEST_FILTER: Final = 16
 """60F9h/5 is an exponent; beyond it the loop is dead anyway (a minute)."""
@@ -58,9 +59,10 @@ def _tune_velocity_loop(store: ObjectStore, plant: AxisPlant) -> None:
     filter_s = 2 ** min(store.number(0x60F9, 5), _LONGEST_FILTER) / 1000
     usual = constants.inertia_kgm2 / _VELOCITY_LOOP_S / constants.torque_nm_per_a
     p[k.FILTER] = 1 - exp(-k.CYCLE_S / filter_s)
-    slower = _BLADE_SHARE if p[k.SPEED_SOURCE] == k.BLADE_ENCODER else 1.0
-    p[k.VELOCITY_P] = usual * slower * store.number(0x60F9, 1) / _VELOCITY_GAIN
-    p[k.VELOCITY_I] = usual * slower / _VELOCITY_RESET_S * store.number(0x60F9, 2) / _VELOCITY_INTEGRAL
+    by_blade = p[k.SPEED_SOURCE] == k.BLADE_ENCODER
+    gain, integral = (_BLADE_GAIN, _BLADE_INTEGRAL) if by_blade else (1.0, 1.0)
+    p[k.VELOCITY_P] = usual * gain * store.number(0x60F9, 1) / _VELOCITY_GAIN
+    p[k.VELOCITY_I] = usual * integral / _VELOCITY_RESET_S * store.number(0x60F9, 2) / _VELOCITY_INTEGRAL
     p[k.VELOCITY_D] = usual * _DIFFERENTIAL_S / filter_s * store.number(0x60F9, 3) / _VELOCITY_DIFFERENTIAL
 
 
