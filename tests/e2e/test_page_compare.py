@@ -190,8 +190,9 @@ def test_each_reason_for_no_value_has_its_own_words(home: Home) -> None:
     page = home.page
     some = {address: raw for address, raw in home.values(ONE).items() if address != LIMIT}
     part = home.take(ONE, values=some)
+    silent = home.take(ONE, values={**some, Address(0x3110, 2): 560}, unread={LIMIT: "no answer"})
     other = home.take(ONE, description_version="9.0.0")
-    home.go(f"tab=compare&columns=live:{ONE},set:{part},stored:{ONE},live:wtg-07/blade-1/pmc&rows=all")
+    home.go(f"tab=compare&columns=live:{ONE},set:{part},set:{silent},live:wtg-07/blade-1/pmc&rows=all")
     page.get_by_test_id("compare-find").fill("3110:01")
     row = page.get_by_test_id("compared-3110:01")
     expect(row).to_contain_text("not in this set")
