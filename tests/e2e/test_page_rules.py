@@ -72,7 +72,7 @@ def test_a_value_that_breaks_the_ladder_is_told_before_it_is_written_and_leads_t
     field.fill("120")
     expect(finding).to_have_count(0)
     field.fill("410")
-
+    expect(finding).to_contain_text("6510:04 = 410 V")  # what appears above the button moves it
     page.get_by_test_id("stage").click()
     expect(page.get_by_test_id("rule-mark-6510:04")).to_be_visible()
     panel.get_by_test_id("rule-jump-30FA:03").first.click()
