@@ -59,6 +59,11 @@ SHOTS: Final = (
         "main [data-testid$='blade-3/pmm-3110:01']:has-text('50.0')",
     ),
     Shot("sets", "/sets", "main [role=row]:has-text('yearly service')"),
+    Shot(
+        "compare",
+        "/sets?tab=compare&columns=live:wtg-07/blade-1/pmc,live:wtg-07/blade-2/pmc,default:wtg-07/blade-1/pmc",
+        "[data-testid=compared-607F]",
+    ),
     Shot("recordings", "/recordings", "main [role=row] >> nth=1"),
     Shot("bus", "/bus", "[data-testid=trace-row] >> nth=20"),
     Shot("bus-nodes", "/bus?tab=nodes", "main :text('Blade 3 PMC')"),
