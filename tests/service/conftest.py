@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import AsyncIterator, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from threading import Event
 
 import pytest
 
@@ -41,8 +42,15 @@ class Served:
         self.thread.call_soon(close_all)
 
     def spoil(self, fault: Fault) -> None:
-        """Have one coming frame dropped, delayed or doubled."""
-        self.thread.call_soon(lambda: self.line.inject(fault))
+        """Have one coming frame dropped, delayed or doubled; the fault waits for it when this returns."""
+        ready = Event()
+
+        def put() -> None:
+            self.line.inject(fault)
+            ready.set()
+
+        self.thread.call_soon(put)
+        assert ready.wait(10.0)
 
 
 @pytest.fixture

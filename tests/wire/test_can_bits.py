@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import random
-import time
 
 import pytest
 
@@ -95,16 +94,3 @@ def test_known_shortest_frames() -> None:
 def test_impossible_frames_are_refused(can: Can) -> None:
     with pytest.raises(ValueError):
         frame_bits(can)
-
-
-def test_is_fast_enough_for_every_frame() -> None:
-    """Best of several rounds under 10 us a frame that is not cached; typical is 1 to 2 us."""
-    rng = random.Random(4)
-    best = 1.0
-    for _ in range(5):
-        frames = [Can(0x181 + i % 8, rng.randbytes(8)) for i in range(2000)]
-        start = time.perf_counter()
-        for can in frames:
-            frame_bits(can)
-        best = min(best, (time.perf_counter() - start) / 2000)
-    assert best < 10e-6
