@@ -105,7 +105,7 @@ class Witness:
         self._farthest = (0.0, 0.0)
         self._has_rested = False
         self._peak_since_ns: int | None = None
-        self._settling_until_ns = self._unwinding_until_ns = 0
+        self._settling_until_ns = self._unwinding_until_ns = self._brakes_until_ns = 0
         self._restarted = self._feathered = False
         self._machine.history.clear()
         setattr(self._machine, "evaluate", self._evaluate)  # noqa: B010 - a method of this one machine
@@ -214,7 +214,9 @@ class Witness:
         pushes = self.controllers_damped and rpm * torque > 0 and abs(torque) > _CURRENT_PERMILLE
         by_motor = self.rig.pmc.drive.feedback is Feedback.MOTOR_ENCODER
         knows_rpm = self.scaling_as_fitted or by_motor  # the blade encoder tells the motor's speed through 6091h
-        if t_ns >= self._settling_until_ns and pushes and knows_rpm:
+        if not knows_rpm:
+            self._brakes_until_ns = t_ns + 300 * MS  # once it knows, it has to brake first
+        if t_ns >= max(self._settling_until_ns, self._brakes_until_ns) and pushes:
             assert abs(rpm) <= store(0x6080) * _SPEED_SHARE + _SPEED_RPM, "6080h"
         units = abs(store(0x606C))
         per_rpm = abs(self.rig.pmc.drive.scaling.units_per_rad) / 9.549
