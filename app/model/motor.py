@@ -199,8 +199,7 @@ def _checked_number(one: PlateField, number: Decimal) -> Decimal:
 
 def _plain(number: Decimal) -> Decimal:
     """Without zeros behind, and never with an exponent: 5.50 is 5.5, and 1E+2 is 100."""
-    number = number.normalize()
-    return number if number.as_tuple().exponent <= 0 else number.quantize(Decimal(1))  # type: ignore[operator]
+    return Decimal(f"{number.normalize():f}")
 
 
 def check_values(description: Description, values: Mapping[Address, int]) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Future
 from dataclasses import dataclass
@@ -21,6 +20,7 @@ from app.twins.safety_chain import SafetyChain
 from app.twins.socketcand_server import SocketcandServer
 from app.twins.state_file import Memory, StateFile
 from app.twins.turbine import Blade, Settings
+from tests.drivers.wire import until
 
 T = TypeVar("T")
 MS: Final = 1_000_000
@@ -154,10 +154,7 @@ class Station:
 
     def settle(self, timeout_s: float = 10.0) -> None:
         """Wait for that."""
-        until_s = time.monotonic() + timeout_s
-        while not self.do(self.settled):
-            assert time.monotonic() < until_s, f"status {self.blade.pmc.device.store.number(0x6041):04X}h"
-            time.sleep(0.002)
+        until(lambda: self.do(self.settled), timeout_s)
 
     def snapshot(self) -> Snapshot:
         """Take down what they hold."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Awaitable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Final
@@ -129,10 +129,10 @@ class Transaction:
         self._tell(Kind.RESTORE_TURNED_BACK)
         return await self._guarded(self._go_back(), falls_back=False)
 
-    async def _guarded(self, way: object, falls_back: bool) -> End:
+    async def _guarded(self, way: Awaitable[End], falls_back: bool) -> End:
         """Whatever happens, the state that is kept in the end tells the truth."""
         try:
-            return await way  # type: ignore[misc, no-any-return]
+            return await way
         except Broken as broken:
             self.broken = self.broken or broken
             wanted_back = broken.cause is Cause.CANCELLED

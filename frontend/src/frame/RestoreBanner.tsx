@@ -13,7 +13,7 @@ import { type PageSearch, roomSearch, usePageSearch } from "./search";
 import classes from "./RestoreBanner.module.css";
 
 /** Comes with the sets room, which is not part of the first load. */
-const WaysOut = lazy(async () => ({ default: (await import("../pages/sets/restore/Ended")).WaysOut }));
+const WaysOut = lazy(async () => ({ default: (await import("../pages/sets/restore/Decision")).WaysOut }));
 
 const LOOKS = {
   incomplete: { Icon: IconAlertOctagon, tone: "error" },

@@ -9,21 +9,25 @@ import {
   IconJson,
 } from "@tabler/icons-react";
 import { recordPath, type RestoreDoc } from "../../../api/restore";
-import { NeedsRole } from "../../../frame/NeedsRole";
 import { usePageSearch } from "../../../frame/search";
 import { useTexts } from "../../../texts/texts";
-import { HoldButton } from "../../../ui/HoldButton";
 import { dayAndTime } from "../../../ui/format";
 import { useStationName } from "./names";
 import { Cause } from "./RestoreRun";
 import classes from "./Restore.module.css";
-import { useWay } from "./ways";
+import { WaysOut } from "./Decision";
 
 const LOOKS = {
   new: { Icon: IconCircleCheck, tone: "tone-ok" },
   old: { Icon: IconArrowBackUp, tone: "tone-warning" },
   incomplete: { Icon: IconAlertOctagon, tone: "tone-error" },
 } as const;
+
+const RECORDS = [
+  { format: "html", Icon: IconFileCertificate },
+  { format: "pdf", Icon: IconFileTypePdf },
+  { format: "json", Icon: IconJson },
+] as const;
 
 /** How it ended, what that means for the blade, and what can be done now. */
 export function Ended({ doc }: { doc: RestoreDoc }) {
@@ -57,74 +61,25 @@ function ranBy(doc: RestoreDoc, t: ReturnType<typeof useTexts>): string {
   return parts.filter((part) => part !== "").join(" · ");
 }
 
-/** On to the new values or back to the old ones: one of the two must be done before anything moves again. */
-export function WaysOut({ doc }: { doc: Pick<RestoreDoc, "id"> }) {
-  const t = useTexts();
-  const way = useWay(doc);
-  return (
-    <NeedsRole role="technician">
-      {(locked) => (
-        <div className={classes.buttons}>
-          <HoldButton
-            tone="danger"
-            hint={t("page.hold")}
-            disabled={locked || way.isPending}
-            onHeld={() => way.mutate("roll-back")}
-            testId="roll-back-hold"
-          >
-            {t("page.restoring.roll_back")}
-          </HoldButton>
-          <HoldButton
-            tone="accent"
-            hint={t("page.hold")}
-            disabled={locked || way.isPending}
-            onHeld={() => way.mutate("resume")}
-            testId="resume-hold"
-          >
-            {t("page.restoring.resume")}
-          </HoldButton>
-        </div>
-      )}
-    </NeedsRole>
-  );
-}
-
 function Links({ doc }: { doc: RestoreDoc }) {
   const t = useTexts();
   const [, update] = usePageSearch();
   const undo = Object.values(doc.undo);
   return (
     <div className={classes.links}>
-      <Button
-        component="a"
-        variant="default"
-        href={recordPath(doc.id, "html", t.language)}
-        download
-        leftSection={<IconFileCertificate size={17} aria-hidden />}
-        data-testid="record-html"
-      >
-        {t("page.restoring.record.html")}
-      </Button>
-      <Button
-        component="a"
-        variant="default"
-        href={recordPath(doc.id, "pdf", t.language)}
-        download
-        leftSection={<IconFileTypePdf size={17} aria-hidden />}
-        data-testid="record-pdf"
-      >
-        {t("page.restoring.record.pdf")}
-      </Button>
-      <Button
-        component="a"
-        variant="default"
-        href={recordPath(doc.id, "json", t.language)}
-        download
-        leftSection={<IconJson size={17} aria-hidden />}
-        data-testid="record-json"
-      >
-        {t("page.restoring.record.json")}
-      </Button>
+      {RECORDS.map(({ format, Icon }) => (
+        <Button
+          key={format}
+          component="a"
+          variant="default"
+          href={recordPath(doc.id, format, t.language)}
+          download
+          leftSection={<Icon size={17} aria-hidden />}
+          data-testid={`record-${format}`}
+        >
+          {t(`page.restoring.record.${format}`)}
+        </Button>
+      ))}
       {doc.end === "new" && undo.length > 0 && (
         <Button
           variant="default"

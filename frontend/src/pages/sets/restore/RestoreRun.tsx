@@ -12,7 +12,6 @@ import { type RestoreDoc, restoreQuery } from "../../../api/restore";
 import { NeedsRole } from "../../../frame/NeedsRole";
 import { usePageSearch } from "../../../frame/search";
 import { useTexts } from "../../../texts/texts";
-import { HoldButton } from "../../../ui/HoldButton";
 import { ProblemAlert } from "../../../ui/ProblemAlert";
 import { Ended } from "./Ended";
 import { useStationName } from "./names";
@@ -20,6 +19,7 @@ import classes from "./Restore.module.css";
 import { minutesOf, phasesOf, shareOf, type Standing } from "./run";
 import { RunValues } from "./RunValues";
 import { useWay } from "./ways";
+import { Decision } from "./Decision";
 
 /** One restore: while it runs, while it waits for a person, and how it ended. */
 export function RestoreRun({ id }: { id: string }) {
@@ -122,7 +122,6 @@ const SHORT_S = 60;
 function Confirmation({ doc }: { doc: RestoreDoc }) {
   const t = useTexts();
   const station = useStationName()(doc.station);
-  const way = useWay(doc);
   const leftS = doc.left_s ?? 0;
   return (
     <div className={classes.confirm} role="alert" data-testid="restore-confirm">
@@ -138,30 +137,12 @@ function Confirmation({ doc }: { doc: RestoreDoc }) {
         <strong>{t("page.restoring.confirm.title", { station })}</strong>
         <div>{t("page.restoring.confirm.explain")}</div>
       </div>
-      <NeedsRole role="technician">
-        {(locked) => (
-          <div className={classes.buttons}>
-            <HoldButton
-              tone="danger"
-              hint={t("page.hold")}
-              disabled={locked || way.isPending}
-              onHeld={() => way.mutate("roll-back")}
-              testId="roll-back-hold"
-            >
-              {t("page.restoring.roll_back")}
-            </HoldButton>
-            <HoldButton
-              tone="accent"
-              hint={t("page.hold")}
-              disabled={locked || way.isPending || !doc.can.includes("confirm")}
-              onHeld={() => way.mutate("confirm")}
-              testId="confirm-hold"
-            >
-              {t("page.restoring.confirm.button")}
-            </HoldButton>
-          </div>
-        )}
-      </NeedsRole>
+      <Decision
+        doc={doc}
+        onward="confirm"
+        label={t("page.restoring.confirm.button")}
+        disabled={!doc.can.includes("confirm")}
+      />
     </div>
   );
 }
