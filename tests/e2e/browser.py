@@ -4,8 +4,14 @@ from __future__ import annotations
 
 import os
 import shutil
-from typing import Final
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any, Final
 
+from playwright.sync_api import Browser, BrowserContext, ViewportSize, expect
+
+SIZE: Final[ViewportSize] = {"width": 1366, "height": 768}
+WAIT_MS: Final = 30_000
 CHROMIUM: Final = os.environ.get("CHROMIUM") or shutil.which("chromium") or "/usr/bin/chromium"
 FLAGS: Final = [
     "--no-sandbox",
@@ -17,3 +23,16 @@ FLAGS: Final = [
 ]
 SOFTWARE_3D: Final = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 """Renders the 3D view without a graphics card, at the cost of whole cores."""
+
+
+@contextmanager
+def signed_in(browser: Browser, url: str, **options: Any) -> Iterator[BrowserContext]:
+    """A context whose session was opened by the address ``url``, which the demo prints and which works once."""
+    context = browser.new_context(viewport=SIZE, locale="en-GB", **options)
+    context.set_default_timeout(WAIT_MS)
+    first = context.new_page()
+    first.goto(url)
+    expect(first.get_by_test_id("mode")).to_contain_text("TWIN", timeout=WAIT_MS)
+    first.close()
+    yield context
+    context.close()

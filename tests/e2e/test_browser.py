@@ -13,8 +13,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
-from playwright.sync_api import Browser, BrowserContext, Page, ViewportSize, expect, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, Page, expect
 
+from tests.e2e.browser import SIZE, WAIT_MS
 from tests.e2e.processes import Process, running
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(300)]
@@ -30,8 +31,6 @@ FLAGS = [
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
 ]
-SIZE: ViewportSize = {"width": 1366, "height": 768}
-WAIT_MS = 30_000
 expect.set_options(timeout=15_000)
 
 
@@ -42,15 +41,6 @@ def demo(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, Proces
     with running("demo", "--port", "0", "--data", str(data), "--json") as process:
         url = json.loads(process.wait_for('"url"'))["url"]
         yield url, process, data
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    """One Chromium for all tests."""
-    with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        yield chromium
-        chromium.close()
 
 
 @pytest.fixture(scope="module")

@@ -11,9 +11,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, BrowserContext, Locator, Page, expect, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, Locator, Page, expect
 
-from tests.e2e.browser import CHROMIUM, FLAGS
 from tests.e2e.conftest import site_for
 from tests.e2e.processes import ROOT, running
 
@@ -23,14 +22,6 @@ RATE = 8000
 WATCHED_MS = 8000
 LONGEST_MS = 50.0
 expect.set_options(timeout=20_000)
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        yield chromium
-        chromium.close()
 
 
 def profile(browser: Browser, url: str) -> BrowserContext:

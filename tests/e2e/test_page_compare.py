@@ -11,12 +11,11 @@ from pathlib import Path
 from typing import Any, Final
 
 import pytest
-from playwright.sync_api import Browser, Locator, Page, expect, sync_playwright
+from playwright.sync_api import Browser, Locator, Page, expect
 
 from app.model.address import Address
 from app.model.datatypes import Raw
 from app.model.sets import dump_set, load_set
-from tests.e2e.browser import CHROMIUM, FLAGS
 from tests.e2e.processes import running
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(300)]
@@ -72,14 +71,6 @@ class Home:
     def values(self, device: str) -> dict[Address, Raw]:
         """Those of the latest set of a device."""
         return dict(load_set(self.download(device), "downloaded.json").values)
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        yield chromium
-        chromium.close()
 
 
 @pytest.fixture(scope="module")

@@ -12,9 +12,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, BrowserContext, Locator, Page, ViewportSize, expect, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, Locator, Page, ViewportSize, expect
 
-from tests.e2e.browser import CHROMIUM, FLAGS
 from tests.e2e.conftest import Twins
 from tests.e2e.processes import HUBSIDE, ROOT, Process, running
 
@@ -71,14 +70,6 @@ def serving(data: Path, *arguments: str, port: str = "0") -> Iterator[Served]:
         served = Served(process, json.loads(process.wait_for('"url"', WAIT_MS / 1000))["url"])
         yield served
         assert served.errors == []
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        yield chromium
-        chromium.close()
 
 
 @pytest.fixture

@@ -11,9 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, BrowserContext, Locator, Page, expect, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, Locator, Page, expect
 
-from tests.e2e.browser import CHROMIUM, FLAGS
 from tests.e2e.conftest import Twins
 from tests.e2e.processes import Process, running
 from tests.e2e.test_page_quality import AXE
@@ -42,14 +41,6 @@ class Demo:
         """What the API answers to this browser's session."""
         answer = self.context.request.fetch(f"{self.home}api/instructor{path}", method=method, data=body)
         return answer.status, answer.json()
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        yield chromium
-        chromium.close()
 
 
 def let_in(browser: Browser, process: Process, ready: str) -> Demo:

@@ -3,37 +3,18 @@
 from __future__ import annotations
 
 import csv
-import json
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, Page, expect, sync_playwright
+from playwright.sync_api import Browser, Page, expect
 
-from tests.e2e.browser import CHROMIUM, FLAGS
-from tests.e2e.processes import running
-from tests.e2e.test_browser import SIZE, WAIT_MS
+from tests.e2e.browser import SIZE, WAIT_MS
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(240)]
 
 EXAMPLE = "0197a000-0000-7000-8000-00000000e003"
 DRIVE = "wtg-07/blade-1/pmc"
-
-
-@pytest.fixture(scope="module")
-def demo(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """``hubside demo`` on a free port: the address that it prints."""
-    data = tmp_path_factory.mktemp("data")
-    with running("demo", "--port", "0", "--data", str(data), "--json") as process:
-        yield json.loads(process.wait_for('"url"'))["url"]
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        yield chromium
-        chromium.close()
 
 
 @pytest.fixture(scope="module")

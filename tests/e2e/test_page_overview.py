@@ -8,9 +8,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import pytest
-from playwright.sync_api import Browser, BrowserContext, Page, expect, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, Page, expect
 
-from tests.e2e.browser import CHROMIUM, FLAGS
 from tests.e2e.processes import running
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(300)]
@@ -30,14 +29,6 @@ class Demo:
         page = self.context.new_page()
         page.goto(f"{self.home}{path}{'&' if '?' in path else '?'}scene=off")
         return page
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        yield chromium
-        chromium.close()
 
 
 @pytest.fixture(scope="module")

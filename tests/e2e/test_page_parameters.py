@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Iterator
 from statistics import median
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, BrowserContext, Page, Route, expect, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, Page, Route, expect
 
-from tests.e2e.browser import CHROMIUM, FLAGS
-from tests.e2e.processes import running
-from tests.e2e.test_browser import SIZE, WAIT_MS, hold
+from tests.e2e.browser import WAIT_MS, signed_in
+from tests.e2e.test_browser import hold
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(300)]
 
@@ -21,41 +19,9 @@ BLADES = tuple(f"wtg-07/blade-{number}/pmm" for number in (1, 2, 3))
 
 
 @pytest.fixture(scope="module")
-def demo(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """``hubside demo`` on a free port: the address that it prints."""
-    data = tmp_path_factory.mktemp("data")
-    with running("demo", "--port", "0", "--data", str(data), "--json") as process:
-        yield json.loads(process.wait_for('"url"'))["url"]
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        yield chromium
-        chromium.close()
-
-
-@pytest.fixture(scope="module")
 def context(browser: Browser, demo: str) -> Iterator[BrowserContext]:
-    context = browser.new_context(viewport=SIZE, color_scheme="dark", locale="en-GB")
-    context.set_default_timeout(WAIT_MS)
-    first = context.new_page()
-    first.goto(demo)
-    expect(first.get_by_test_id("mode")).to_be_visible(timeout=WAIT_MS)
-    first.close()
-    yield context
-    context.close()
-
-
-@pytest.fixture
-def page(context: BrowserContext) -> Iterator[Page]:
-    page = context.new_page()
-    errors: list[str] = []
-    page.on("pageerror", lambda error: errors.append(str(error)))
-    yield page
-    page.close()
-    assert errors == []
+    with signed_in(browser, demo, color_scheme="dark") as context:
+        yield context
 
 
 def at(demo: str, search: str) -> str:

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import gzip
-import json
-from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, BrowserContext, Page, expect, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, Page, expect
 
-from tests.e2e.browser import CHROMIUM, FLAGS
-from tests.e2e.processes import ROOT, running
-from tests.e2e.test_browser import SIZE, WAIT_MS
+from tests.e2e.browser import SIZE, WAIT_MS
+from tests.e2e.processes import ROOT
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(300)]
 
@@ -51,35 +48,6 @@ PLACES = (
     "instructor?tab=scenarios",
 )
 ROOMS = ("Axis", "Parameters", "Sets", "Recordings", "Bus", "Procedures", "Settings", "Instructor", "Overview")
-
-
-@pytest.fixture(scope="module")
-def demo(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """``hubside demo`` on a free port: the address that it prints."""
-    data = tmp_path_factory.mktemp("data")
-    with running("demo", "--port", "0", "--data", str(data), "--json") as process:
-        yield json.loads(process.wait_for('"url"'))["url"]
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        yield chromium
-        chromium.close()
-
-
-@pytest.fixture(scope="module")
-def context(browser: Browser, demo: str) -> Iterator[BrowserContext]:
-    """Signed in. The content security policy is passed by, because axe is put into the page."""
-    context = browser.new_context(viewport=SIZE, locale="en-GB", reduced_motion="reduce", bypass_csp=True)
-    context.set_default_timeout(WAIT_MS)
-    first = context.new_page()
-    first.goto(demo)
-    expect(first.get_by_test_id("mode")).to_contain_text("TWIN", timeout=WAIT_MS)
-    first.close()
-    yield context
-    context.close()
 
 
 def address(demo: str, place: str, **search: str) -> str:

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, BrowserContext, Page, expect, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, Page, expect
 
-from tests.e2e.browser import CHROMIUM, FLAGS
+from tests.e2e.browser import SIZE, WAIT_MS
 from tests.e2e.conftest import Twins
 from tests.e2e.processes import running
-from tests.e2e.test_browser import SIZE, WAIT_MS, hold
+from tests.e2e.test_browser import hold
 from tests.e2e.test_page_quality import AXE
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(300)]
@@ -26,35 +25,6 @@ CHANGED = ((PMM, "3110:01", 470), (PMM, "30FA:02", 740), (PMC, "6065", 200))
 
 
 @pytest.fixture(scope="module")
-def demo(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """``hubside demo`` on a free port: the address that it prints."""
-    data = tmp_path_factory.mktemp("data")
-    with running("demo", "--port", "0", "--data", str(data), "--json") as process:
-        yield json.loads(process.wait_for('"url"'))["url"]
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        yield chromium
-        chromium.close()
-
-
-@pytest.fixture(scope="module")
-def context(browser: Browser, demo: str) -> Iterator[BrowserContext]:
-    """Signed in. The content security policy is passed by, because axe is put into the page."""
-    context = browser.new_context(viewport=SIZE, locale="en-GB", reduced_motion="reduce", bypass_csp=True)
-    context.set_default_timeout(WAIT_MS)
-    first = context.new_page()
-    first.goto(demo)
-    expect(first.get_by_test_id("mode")).to_contain_text("TWIN", timeout=WAIT_MS)
-    first.close()
-    yield context
-    context.close()
-
-
-@pytest.fixture(scope="module")
 def sets(context: BrowserContext, demo: str) -> str:
     """Ids of the sets of blade 1 as it was found when the visit began."""
     page = context.new_page()
@@ -62,16 +32,6 @@ def sets(context: BrowserContext, demo: str) -> str:
     found = found_sets(page)
     page.close()
     return found
-
-
-@pytest.fixture
-def page(context: BrowserContext) -> Iterator[Page]:
-    page = context.new_page()
-    errors: list[str] = []
-    page.on("pageerror", lambda error: errors.append(str(error)))
-    yield page
-    page.close()
-    assert errors == []
 
 
 def tab(demo: str, search: str = "") -> str:

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 
 import pytest
-from playwright.sync_api import Browser, BrowserContext, Page, expect, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, Page, expect
 
-from tests.e2e.browser import CHROMIUM, FLAGS
-from tests.e2e.processes import running
-from tests.e2e.test_browser import SIZE, WAIT_MS
+from tests.e2e.browser import WAIT_MS, signed_in
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(300)]
 
@@ -19,40 +16,9 @@ PMC = "wtg-07/blade-2/pmc"
 
 
 @pytest.fixture(scope="module")
-def demo(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    data = tmp_path_factory.mktemp("data")
-    with running("demo", "--port", "0", "--data", str(data), "--json") as process:
-        yield json.loads(process.wait_for('"url"'))["url"]
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        yield chromium
-        chromium.close()
-
-
-@pytest.fixture(scope="module")
 def context(browser: Browser, demo: str) -> Iterator[BrowserContext]:
-    context = browser.new_context(viewport=SIZE, color_scheme="dark", locale="en-GB")
-    context.set_default_timeout(WAIT_MS)
-    first = context.new_page()
-    first.goto(demo)
-    expect(first.get_by_test_id("mode")).to_be_visible(timeout=WAIT_MS)
-    first.close()
-    yield context
-    context.close()
-
-
-@pytest.fixture
-def page(context: BrowserContext) -> Iterator[Page]:
-    page = context.new_page()
-    errors: list[str] = []
-    page.on("pageerror", lambda error: errors.append(str(error)))
-    yield page
-    page.close()
-    assert errors == []
+    with signed_in(browser, demo, color_scheme="dark") as context:
+        yield context
 
 
 def test_a_value_that_breaks_the_ladder_is_told_before_it_is_written_and_leads_to_its_partner(
