@@ -69,9 +69,7 @@ def identity_of(values: Mapping[Address, Raw], nameplate: str | None = None) -> 
     """What the values of a device say of its identity; what is of another type than it should be says nothing."""
     texts = ("device_name", "hardware", "software")
     found = {name: values.get(address) for name, address in IDENTITY.items()}
-    kept: dict[str, Any] = {
-        name: raw for name, raw in found.items() if isinstance(raw, str if name in texts else int)
-    }
+    kept: dict[str, Any] = {name: raw for name, raw in found.items() if isinstance(raw, str if name in texts else int)}
     return Identity(**kept, nameplate=nameplate)
 
 
