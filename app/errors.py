@@ -21,6 +21,7 @@
     │   ├── LimitError                      the value is out of range; names the limit
     │   ├── PreconditionError               another object or state forbids it
     │   ├── ConflictError                   another value than the one that was seen stands in RAM
+    │   ├── OvertakenError                  STOP or FEATHER came before the write left
     │   ├── MotionError                     the write could set an axis in motion
     │   ├── CommunicationError              the write changes PDOs, or is a save or load command
     │   ├── ConsentError                    active access needs consent (other master seen)
@@ -44,6 +45,7 @@
     │   ├── RestoreChangedError             the plan of a restore is no longer the one that was looked at
     │   ├── RestoreStateError               not in the state that a restore is in
     │   ├── RestoreUnknownError             no such restore
+    │   ├── RestoreRecordError              a restore of which there is no record
     │   ├── SetUnknownError                 no such parameter set
     │   ├── SetTagError                     a tag that visits give, not people
     │   ├── SetIncompleteError              a set with unread objects cannot be golden
@@ -201,6 +203,12 @@ class ConflictError(RefusedError):
     code = "conflict"
 
 
+class OvertakenError(RefusedError):
+    """STOP or FEATHER went to the object before the write left: it was not sent. Details: bus, node, address."""
+
+    code = "overtaken"
+
+
 class MotionError(RefusedError):
     """The write could set an axis in motion, and nobody has taken charge of that. Details: address, name."""
 
@@ -337,6 +345,12 @@ class RestoreUnknownError(RefusedError):
     """No such restore. Details: restore."""
 
     code = "restore_unknown"
+
+
+class RestoreRecordError(RefusedError):
+    """Of this restore there is no record, and none can be made. Details: restore."""
+
+    code = "restore_record"
 
 
 class SetUnknownError(RefusedError):

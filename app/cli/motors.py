@@ -318,7 +318,7 @@ async def _delete(arguments: argparse.Namespace, output: Output, motors: Motors)
 
 def _apply(arguments: argparse.Namespace, output: Output) -> int:
     motor = asyncio.run(_spec(arguments))
-    nothing = {"station": None, "select": None, "resume": None, "roll_back": None, "list": False}
+    nothing = {"station": None, "select": None, "resume": None, "roll_back": None, "list": False, "record_of": None}
     return restore(argparse.Namespace(**vars(arguments) | nothing | {"set": [motor]}), output)
 
 

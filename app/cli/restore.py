@@ -1,4 +1,4 @@
-"""``hubside restore``: put sets into a station as one transaction; resume, roll back or list what was begun."""
+"""``hubside restore``: put sets into a station as one transaction; resume, roll back, list or prove what was begun."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ from typing import Any, Final
 from app.cli.arguments import seconds
 from app.cli.connecting import connected, run_command
 from app.cli.output import Output
-from app.cli.restore_plan import tell_plan
+from app.cli.restore_record import check_target, earlier_record, try_record
+from app.cli.restore_told import Told
 from app.cli.targets import add_connection
 from app.errors import RestoreRefusedError, RestoreStateError, SetFileError, UsageError
 from app.model.address import parse_address
@@ -51,6 +52,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     way.add_argument("--resume", nargs="?", const="", metavar="ID", help="go on with one that is incomplete")
     way.add_argument("--roll-back", nargs="?", const="", metavar="ID", help="take back one that is incomplete")
     way.add_argument("--list", action="store_true", help="restores of the data folder, newest first")
+    way.add_argument("--record-of", metavar="ID", help="write the record of one that has ended to --record-file")
     parser.set_defaults(run=restore)
 
 
@@ -65,6 +67,9 @@ def add_terms(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--reason", default="", help="why, kept in the record")
     parser.add_argument("--work-order", default="", help="kept in the record")
+    parser.add_argument(
+        "--record-file", type=Path, metavar="FILE", help="write the sealed record there: .html, .pdf or .json"
+    )
     parser.add_argument("--expert", action="store_true", help="also restore what only the maker sets")
     parser.add_argument(
         "--other-blades-confirmed", action="store_true", help="with --expert: the other blades need not be in feather"
@@ -79,6 +84,8 @@ def restore(arguments: argparse.Namespace, output: Output) -> int:
     _check(arguments)
     if arguments.list:
         return run_command(_list(arguments, output))
+    if arguments.record_of is not None:
+        return run_command(earlier_record(arguments, output))
     decided = arguments.resume is not None or arguments.roll_back is not None
     return run_command((_decide if decided else _restore)(arguments, output))
 
@@ -86,17 +93,31 @@ def restore(arguments: argparse.Namespace, output: Output) -> int:
 def _check(arguments: argparse.Namespace) -> None:
     """Raises UsageError where the arguments do not go together."""
     decided = arguments.resume is not None or arguments.roll_back is not None
-    if arguments.list or decided:
+    alone = arguments.list or arguments.record_of is not None
+    if alone or decided:
         if arguments.set:
-            raise UsageError(reason="sets are named only for a new restore, not with --list, --resume or --roll-back")
+            raise UsageError(
+                reason="sets are named only for a new restore, not with --list, --record-of, --resume or --roll-back"
+            )
     elif not arguments.set:
         raise UsageError(reason="name the sets to restore: files, or ids of the library")
-    if not arguments.list and arguments.can is None and arguments.site is None:
+    if not alone and arguments.can is None and arguments.site is None:
         raise UsageError(reason="name the bus: --site FILE or --can INTERFACE:CHANNEL")
+    _check_terms(arguments)
+
+
+def _check_terms(arguments: argparse.Namespace) -> None:
+    """What a person says of a restore besides the sets."""
     if arguments.confirm_within < LEAST_CONFIRM_S:
         raise UsageError(reason=f"--confirm-within: nobody decides in less than {LEAST_CONFIRM_S:g} s")
     if (arguments.other_blades_confirmed or arguments.accept) and not arguments.expert:
         raise UsageError(reason="--other-blades-confirmed and --accept are for experts: add --expert")
+    if arguments.record_file is not None:
+        if arguments.plan or arguments.list:
+            raise UsageError(reason="--record-file: --plan and --list make no record")
+        check_target(arguments.record_file)
+    elif arguments.record_of is not None:
+        raise UsageError(reason="--record-of: name the file with --record-file FILE")
 
 
 # -- list ----------------------------------------------------------------------------
@@ -154,28 +175,29 @@ async def _desk(arguments: argparse.Namespace, output: Output) -> AsyncIterator[
 
 
 async def _restore(arguments: argparse.Namespace, output: Output) -> int:
-    async with _desk(arguments, output) as (desk, connection, office):
-        order = await _order(arguments, connection, office)
-        prepared = await desk.prepare(
-            connection,
-            order,
-            lambda done, total: output.progress("cli.reading", device=order.station, done=done, total=total),
-        )
-        tell_plan(prepared, output)
-        if arguments.plan:
-            return RestoreRefusedError.exit_code if prepared.refusals else 0
-        restore_id = await desk.begin(connection, prepared, prepared.hash)
-        return await _follow(arguments, output, desk, restore_id, End.NEW)
+    with Told(output) as told:
+        async with _desk(arguments, output) as (desk, connection, office):
+            order = await _order(arguments, connection, office)
+            prepared = await desk.prepare(
+                connection,
+                order,
+                lambda done, total: output.progress("cli.reading", device=order.station, done=done, total=total),
+            )
+            told.plan(prepared)
+            if arguments.plan:
+                return RestoreRefusedError.exit_code if prepared.refusals else 0
+            restore_id = await desk.begin(connection, prepared, prepared.hash)
+            return await _follow(arguments, told, desk, restore_id, End.NEW)
 
 
 async def _decide(arguments: argparse.Namespace, output: Output) -> int:
-    async with _desk(arguments, output) as (desk, connection, _office):
-        onward = arguments.resume is not None
-        restore_id = _open_one(desk, connection, arguments.resume or arguments.roll_back or "")
-        person = arguments.settings.person
-        way = desk.resume if onward else desk.roll_back
-        await way(connection, restore_id, person)
-        return await _follow(arguments, output, desk, restore_id, End.NEW if onward else End.OLD)
+    with Told(output) as told:
+        async with _desk(arguments, output) as (desk, connection, _office):
+            onward = arguments.resume is not None
+            restore_id = _open_one(desk, connection, arguments.resume or arguments.roll_back or "")
+            way = desk.resume if onward else desk.roll_back
+            await way(connection, restore_id, arguments.settings.person)
+            return await _follow(arguments, told, desk, restore_id, End.NEW if onward else End.OLD)
 
 
 def _open_one(desk: Desk, connection: Connection, named: str) -> str:
@@ -267,9 +289,9 @@ def _selected(text: str | None, station: str, given: dict[str, Given]) -> frozen
 # -- what is told --------------------------------------------------------------------
 
 
-async def _follow(arguments: argparse.Namespace, output: Output, desk: Desk, restore_id: str, wanted: End) -> int:
+async def _follow(arguments: argparse.Namespace, told: Told, desk: Desk, restore_id: str, wanted: End) -> int:
     """Until it has ended; Ctrl-C rolls back, and the person confirms by typing."""
-    person = arguments.settings.person
+    output, person = told.output, arguments.settings.person
     loop = asyncio.get_running_loop()
     with contextlib.suppress(NotImplementedError):  # Windows: Ctrl-C ends the command, which leaves it incomplete
         loop.add_signal_handler(signal.SIGINT, lambda: _turn_back(desk, restore_id, person, output))
@@ -284,7 +306,7 @@ async def _follow(arguments: argparse.Namespace, output: Output, desk: Desk, res
             output.progress("cli.restore_at", state=state, done=transaction.done, total=transaction.total)
         await asyncio.sleep(LOOK_S)
     end = await desk.wait(restore_id)
-    return await _tell_end(output, desk, restore_id, end, wanted)
+    return await _tell_end(arguments, told, desk, restore_id, end, wanted)
 
 
 def _word(output: Output) -> str:
@@ -318,14 +340,23 @@ def _read_line(loop: asyncio.AbstractEventLoop, typed: Callable[[str], None]) ->
     threading.Thread(target=read, name="confirmation", daemon=True).start()
 
 
-async def _tell_end(output: Output, desk: Desk, restore_id: str, end: End, wanted: End) -> int:
+async def _tell_end(
+    arguments: argparse.Namespace, told: Told, desk: Desk, restore_id: str, end: End, wanted: End
+) -> int:
+    output, file = told.output, arguments.record_file
     kept = await desk.get(restore_id)
+    failed = await try_record(desk, restore_id, file, arguments.settings.language)
     proven = bool(kept.outcome.get("proven"))
     details = {"restore": restore_id, "station": kept.row.station, "end": end.value, "proven": proven}
     key = f"cli.restore_{end.value}" + ("" if end is not End.NEW or proven else "_unproven")
-    output.result(details, output.texts(key, **details))
+    written = None if file is None or failed is not None else str(file)
+    told.result({**details, "record_file": written}, output.texts(key, **details))
+    if failed is not None:
+        output.error(failed)
+    elif written is not None:
+        output.say("cli.restore_record", restore=restore_id, file=written)
     if end is wanted:
-        return 0
+        return 0 if failed is None else failed.exit_code
     broken = desk.why(restore_id)
     if broken is None:
         raise RestoreStateError(restore=restore_id, station=kept.row.station, state_key=kept.row.state.text_key)

@@ -14,12 +14,9 @@ from app.service.restore.prepare import Prepared
 
 
 def tell_plan(prepared: Prepared, output: Output) -> None:
-    """Rows that are written, how many others are not and why, and every reason against it."""
+    """For people: rows that are written, how many others are not and why, and every reason against it."""
     plan = prepared.plan
     writes = [row for row in plan.rows if row.treatment is Treatment.WRITE]
-    if output.as_json:
-        output.result(_plan_dict(prepared), "")
-        return
     head = ("DEVICE", "ADDRESS", "NAME", "NOW", "WANTED", "UNIT")
     output.table(head, [_row(prepared, row, output) for row in writes])
     counts = Counter(row.why for row in plan.rows if row.why is not None and row.wanted is not None)
@@ -40,7 +37,8 @@ def tell_plan(prepared: Prepared, output: Output) -> None:
         output.say("cli.restore_refusal", device=refusal.device or prepared.order.station, text=text)
 
 
-def _plan_dict(prepared: Prepared) -> dict[str, Any]:
+def plan_dict(prepared: Prepared) -> dict[str, Any]:
+    """The same for machines."""
     rows = [row for row in prepared.plan.rows if row.treatment is not Treatment.EQUAL]
     return {
         "station": prepared.order.station,

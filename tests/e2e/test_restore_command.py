@@ -70,7 +70,9 @@ def test_the_person_decides_and_a_killed_tool_leaves_the_way_back(twins: Twins, 
 
     planned = hubside("restore", file, *site, "--plan", "--json")
     assert planned.code == 0, planned.err
-    assert [(row["address"], row["wanted"]) for row in planned.json["rows"] if row["why"] is None] == [(LIMIT, 490)]
+    assert [(row["address"], row["wanted"]) for row in planned.json["plan"]["rows"] if row["why"] is None] == [
+        (LIMIT, 490)
+    ]
 
     with asked(file, *site) as popen:
         popen.send_signal(signal.SIGINT)
@@ -96,7 +98,7 @@ def test_the_person_decides_and_a_killed_tool_leaves_the_way_back(twins: Twins, 
 
     back = hubside("restore", "--roll-back", *site, "--json")
     assert back.code == 0, back.err
-    assert (back.json["end"], limit(twins)) == ("old", 500)
+    assert (back.json["result"]["end"], limit(twins)) == ("old", 500)
 
     with asked(file, *site, "--reason", "test") as popen:
         out, _ = popen.communicate("confirm\n", timeout=START_S)
