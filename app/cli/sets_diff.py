@@ -12,10 +12,12 @@ from typing import Any, Final
 
 from app.cli.connecting import connected, run_command, sheets_of
 from app.cli.output import Output
+from app.cli.sets_seen import mark, tell_legend
 from app.cli.targets import add_connection, descriptions_for
 from app.cli.users import opened
 from app.errors import UsageError
-from app.model.diff.compare import RowState
+from app.model.diff.column import Cell
+from app.model.diff.compare import Row, RowState
 from app.model.sets import ParameterSet
 from app.model.site import load_site
 from app.service.backup import read_devices, to_set
@@ -27,6 +29,7 @@ from app.service.compare.spec import ColumnKind, ColumnSpec, parse_spec
 from app.service.compare.wording import Words, rows_of
 from app.service.connection import Connection
 from app.service.library.library import Library
+from app.service.library.recovered import Seen
 from app.service.office.visits import Visits
 from app.service.sites import Sites
 from app.service.views import raw_to_json
@@ -169,14 +172,21 @@ def _tell_text(output: Output, compared: Compared, words: Words, same: bool) -> 
     rows = rows_of(compared.comparison.rows, same)
     if rows:
         head = ("ADDRESS", "NAME", "STATE", *(f"({number + 1})" for number in range(len(compared.columns))))
-        table = [
-            (row.address.short, words.name(row), words.state(row), *(words.value(cell) for cell in row.cells))
-            for row in rows
-        ]
+        table = [(row.address.short, words.name(row), words.state(row), *_cells(row, compared, words)) for row in rows]
         output.table(head, table)
+    for one in compared.columns:
+        if one.seen:
+            tell_legend(output, one.recording)
     for line in _findings(compared, words):
         output.line(line)
     output.line(words.sentence(compared.comparison.summary))
+
+
+def _cells(row: Row, compared: Compared, words: Words) -> Iterator[str]:
+    """The values, each with its mark where it comes out of a recording."""
+    for cell, one in zip(row.cells, compared.columns, strict=True):
+        look = one.seen.get(row.address)
+        yield words.value(cell) + ("" if look is None else f"  [{mark(look)}]")
 
 
 def _findings(compared: Compared, words: Words) -> Iterator[str]:
@@ -190,7 +200,14 @@ def _as_json(compared: Compared, words: Words, same: bool) -> dict[str, Any]:
     summary = compared.comparison.summary
     return {
         "columns": [
-            {"spec": str(one.spec), "device": one.column.slug, "t_ns": one.t_ns, "hash": one.hash, "twin": one.twin}
+            {
+                "spec": str(one.spec),
+                "device": one.column.slug,
+                "t_ns": one.t_ns,
+                "hash": one.hash,
+                "twin": one.twin,
+                "recording": one.recording or None,
+            }
             for one in compared.columns
         ],
         "summary": {name: getattr(summary, name) for name in summary.__dataclass_fields__},
@@ -202,16 +219,22 @@ def _as_json(compared: Compared, words: Words, same: bool) -> dict[str, Any]:
                 "state": row.state.value,
                 "class": row.entry.restore.value,
                 "cells": [
-                    {
-                        "state": cell.state.value,
-                        "raw": None if cell.raw is None else raw_to_json(cell.raw),
-                        "shown": cell.shown,
-                        "unit": cell.unit,
-                    }
-                    for cell in row.cells
+                    _cell_json(cell, one.seen.get(row.address))
+                    for cell, one in zip(row.cells, compared.columns, strict=True)
                 ],
                 "findings": list(compared.findings.get(row.address, {})),
             }
             for row in rows_of(compared.comparison.rows, same)
         ],
+    }
+
+
+def _cell_json(cell: Cell, look: Seen | None) -> dict[str, Any]:
+    """``seen`` null: the value comes out of no recording."""
+    return {
+        "state": cell.state.value,
+        "raw": None if cell.raw is None else raw_to_json(cell.raw),
+        "shown": cell.shown,
+        "unit": cell.unit,
+        "seen": None if look is None else look.as_json(),
     }

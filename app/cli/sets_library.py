@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import argparse
+import json
 import time
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Coroutine, Mapping
 from pathlib import Path
 from typing import Any, Final
 
 from app import __version__
 from app.cli.connecting import run_command
 from app.cli.output import Output
+from app.cli.sets_seen import mark, tell_legend
 from app.cli.users import opened
 from app.errors import SetFileError, UsageError
-from app.model.address import is_decimal
+from app.model.address import Address, is_decimal
 from app.model.description import Description
 from app.model.description_file import BUILTIN, load_builtin
 from app.model.set_csv import dump_csv
@@ -25,13 +27,14 @@ from app.model.sets import Origin, ParameterSet, dump_set, iso_time
 from app.model.values import quantity_of, show
 from app.service.library.folder import SetFolder
 from app.service.library.library import Library
-from app.service.library.recovered import Named, Recovered, recover_sets
+from app.service.library.recovered import Named, Recovered, Seen, recover_sets
 from app.store.set_rows import Filter
 from app.wire.records import SdoAccess
 
 Run = Callable[[argparse.Namespace, Output, Library, SetFolder], Coroutine[Any, Any, int]]
 FORMATS: Final = ("json", "dcf", "csv")
 SECOND_NS: Final = 1_000_000_000
+_HEAD: Final = ("ADDRESS", "NAME", "VALUE", "UNIT")
 _SET_HELP: Final = "its id, or 8 or more digits of its hash"
 
 
@@ -120,8 +123,9 @@ async def _list(arguments: argparse.Namespace, output: Output, library: Library,
 async def _show(arguments: argparse.Namespace, output: Output, library: Library, _folder: SetFolder) -> int:
     record = await library.record(arguments.set)
     found = await library.set_of(record)
+    recording, seen = await library.seen(record)
     if output.as_json:
-        output.raw(dump_set(found))
+        output.raw(dump_set(found) if not seen else _with_seen(found, recording, seen))
         return 0
     tags = (await library.tags()).get(record.id, [])
     details = {"device": found.origin.device, "time": found.origin.time, "person": found.origin.person or "–"}
@@ -129,10 +133,23 @@ async def _show(arguments: argparse.Namespace, output: Output, library: Library,
     for entry in tags:
         output.line(output.texts("cli.sets.tagged", tag=output.texts(entry.tag.text_key), person=entry.person))
     description = _known().get(found.description_id)
-    output.table(("ADDRESS", "NAME", "VALUE", "UNIT"), [_line(found, key, description) for key in sorted(found.values)])
+    rows = [(key, _line(found, key, description)) for key in sorted(found.values)]
+    if seen:
+        marked = [(*row, mark(seen[key]) if key in seen else "") for key, row in rows]
+        output.table((*_HEAD, "SEEN"), marked)
+        tell_legend(output, recording)
+    else:
+        output.table(_HEAD, [row for _key, row in rows])
     for address, why in found.unread.items():
         output.say("cli.sets.unread", address=address.short, why=why)
     return 0
+
+
+def _with_seen(found: ParameterSet, recording: str, seen: Mapping[Address, Seen]) -> str:
+    """The set and how its values were seen: for reading, no set file; ``export`` writes that."""
+    looks = {str(address): look.as_json() for address, look in seen.items()}
+    content = json.loads(dump_set(found)) | {"recording": recording, "seen": looks}
+    return json.dumps(content, sort_keys=True, indent=1, ensure_ascii=False) + "\n"
 
 
 async def _import(arguments: argparse.Namespace, output: Output, library: Library, _folder: SetFolder) -> int:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import json
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -10,7 +12,7 @@ from typing import Any
 import pytest
 
 from app.cli.main import main
-from app.model.sets import dump_set
+from app.model.sets import dump_set, iso_time
 from tests.model.set_rig import whole_set
 from tests.web.rig import ROOT
 
@@ -100,5 +102,46 @@ def test_sets_come_out_of_a_recording_with_the_instant_and_direction_of_each_val
     seen = found["wtg-07/blade-2/pmc"]["seen"]
     assert {one["access"] for one in seen.values()} == {"read", "write"}
     assert len(sets.json("list")) == 6
+    assert_shown_as_seen(sets, found["wtg-07/blade-2/pmc"])
     assert sets("recover", VISIT.with_name("none.mcap"))[0] == 2
     assert sets("recover", VISIT, "--node", "12=nobody")[0] == 2
+
+
+def assert_shown_as_seen(sets: Sets, one: dict[str, Any]) -> None:
+    """With instant, direction and doubt of each value: for people, for machines, and beside another set."""
+    shown = json.loads(sets("show", one["id"], "--json")[1])
+    assert shown["recording"] == VISIT.name
+    assert {key.removesuffix(":00"): look for key, look in shown["seen"].items()} == one["seen"]
+    written = next(key for key, look in one["seen"].items() if look["access"] == "write" and not look["ours"])
+    doubtful = next(key for key, look in one["seen"].items() if look["doubt"] == "boot-up")
+    text = sets("show", one["id"])[1]
+    rows = {line.split()[0]: line for line in text.splitlines() if line}
+    looked_at = iso_time(one["seen"][written]["t_ns"])[:19].replace("T", " ")
+    assert f"  w* {looked_at}" in rows[written]
+    assert "? 20" in rows[doubtful]
+    assert f"Seen in {VISIT.name}: r read, w written" in text
+    columns = ("diff", f"set:{one['id']}", f"set:{one['id']}", "--same", "--all")
+    code, told, _err = sets(*columns)
+    assert code == 1, "what nobody saw is missing in both"
+    assert next(line for line in told.splitlines() if line.startswith(written)).count(f"[w* {looked_at}") == 2
+    assert f"Seen in {VISIT.name}" in told
+    row = next(row for row in json.loads(sets(*columns, "--json")[1])["rows"] if row["address"] == written)
+    assert [cell["seen"] for cell in row["cells"]] == [one["seen"][written]] * 2
+    head, *lines = csv.reader(io.StringIO(sets(*columns, "--csv")[1]))
+    line = next(line for line in lines if line[0] == written)
+    assert (
+        line[head.index(next(cell for cell in head if cell.endswith(": seen")))]
+        == f"written {looked_at} UTC, by another master"
+    )
+    html = sets(*columns, "--html", "-")[1]
+    assert html.count(f'<small class="seen">written {looked_at} UTC, by another master</small>') >= 2
+
+
+def test_a_set_that_comes_from_no_recording_has_no_marks(sets: Sets, tmp_path: Path) -> None:
+    source = tmp_path / "in.json"
+    source.write_text(dump_set(whole_set("oat-pmc")))
+    key = sets.json("import", source)["id"]
+    assert sets("show", key, "--json")[1] == source.read_text()
+    assert "Seen in" not in sets("show", key)[1]
+    head = next(csv.reader(io.StringIO(sets("diff", source, f"set:{key}", "--csv", "--same")[1])))
+    assert not [cell for cell in head if cell.endswith(": seen")]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+from collections.abc import Iterator
 from html import escape
 from itertools import groupby
 from typing import Final
@@ -31,6 +32,7 @@ thead th { border-bottom: .4mm solid #16202b; } thead small { display: block; fo
 thead { display: table-header-group; } tr { break-inside: avoid; }
 tr.different td.state { color: #b3261e; font-weight: 700; } tr.unit td.state { color: #2a5d9c; }
 tr.missing td.state, tr.not-comparable td.state { color: #8a5a00; }
+small.seen { display: block; color: #55606b; }
 td.absent { color: #55606b; font-style: italic; } tr.bit th { font-weight: 400; padding-left: 6mm; }
 p.finding { color: #8a5a00; margin: .5mm 0 0; font-weight: 400; }
 footer { margin-top: 6mm; font-size: 8pt; color: #55606b; }
@@ -90,12 +92,7 @@ def _group(title: str, rows: list[Row], compared: Compared, words: Words) -> str
 
 
 def _row(row: Row, compared: Compared, words: Words) -> str:
-    cells = "".join(
-        f"<td>{escape(words.value(cell))}</td>"
-        if cell.raw is not None
-        else f'<td class="absent">{escape(words.value(cell))}</td>'
-        for cell in row.cells
-    )
+    cells = "".join(_cell(row, number, compared, words) for number in range(len(row.cells)))
     findings = "".join(
         f'<p class="finding">⚠ {escape(words.texts(f"rule.{rule}.title"))}</p>'
         for rule in compared.findings.get(row.address, {})
@@ -112,6 +109,15 @@ def _row(row: Row, compared: Compared, words: Words) -> str:
     return "\n".join(lines)
 
 
+def _cell(row: Row, number: int, compared: Compared, words: Words) -> str:
+    """A value, and how it was seen where it comes out of a recording."""
+    cell, look = row.cells[number], compared.columns[number].seen.get(row.address)
+    if cell.raw is None:
+        return f'<td class="absent">{escape(words.value(cell))}</td>'
+    seen = "" if look is None else f'<small class="seen">{escape(words.seen(look))}</small>'
+    return f"<td>{escape(words.value(cell))}{seen}</td>"
+
+
 def to_csv(compared: Compared, texts: Texts, same: bool = False) -> str:
     """The comparison as CSV: a row a parameter, below it one for each bit that differs; shown values with raw ones."""
     words = Words(texts)
@@ -120,19 +126,32 @@ def to_csv(compared: Compared, texts: Texts, same: bool = False) -> str:
     head = ["address", "bit", "name", "group", "class", "state", "findings"]
     for one in compared.columns:
         head += [words.title(one), f"{words.title(one)}: raw"]
+        head += [f"{words.title(one)}: {words.texts('compare.seen')}"] if one.seen else []
     writer.writerow(map(_harmless, head))
     for row in rows_of(compared.comparison.rows, same):
         rules = " ".join(compared.findings.get(row.address, {}))
         group, restore = words.group(row), row.entry.restore.value
-        cells = [text for cell in row.cells for text in (words.value(cell), _raw(cell.raw))]
+        cells = list(_csv_cells(row, compared, words))
         fixed = [row.address.short, "", words.name(row), group, restore, row.state.value, rules]
         writer.writerow(map(_harmless, [*fixed, *cells]))
         for bit in row.bits:
             if bit.differs:
-                cells = [text for number in bit.values for text in (words.bit_value(bit, number), _raw(number))]
+                cells = []
+                for number, one in zip(bit.values, compared.columns, strict=True):
+                    cells += [words.bit_value(bit, number), _raw(number), *([""] if one.seen else [])]
                 fixed = [row.address.short, str(bit.bit), words.bit(bit), group, restore, "different", ""]
                 writer.writerow(map(_harmless, [*fixed, *cells]))
     return out.getvalue()
+
+
+def _csv_cells(row: Row, compared: Compared, words: Words) -> Iterator[str]:
+    """Shown and raw value of every column; of one out of a recording also how the value was seen."""
+    for cell, one in zip(row.cells, compared.columns, strict=True):
+        yield words.value(cell)
+        yield _raw(cell.raw)
+        if one.seen:
+            look = one.seen.get(row.address)
+            yield "" if look is None else words.seen(look)
 
 
 def _raw(raw: Raw | None) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final
 
@@ -21,6 +21,7 @@ from app.service.compare.known import Known, defaults_of, ram_of, stored_of
 from app.service.compare.spec import ColumnKind, ColumnSpec, Unresolved, parse_spec
 from app.service.devices import Target
 from app.service.library.library import Library
+from app.service.library.recovered import Seen
 from app.service.office.visits import known_empty
 from app.service.views import RawJson, raw_from_json
 from app.store.set_rows import Filter
@@ -48,7 +49,8 @@ Pending = Mapping[str, Mapping[Address, Raw]]
 class Shown:
     """A column and what stands above it. ``t_ns`` None: of no time, as defaults are. ``hash`` only of a kept set.
 
-    ``record`` is its id in the library; ``twin`` None: nothing says what it is of.
+    ``record`` is its id in the library; ``twin`` None: nothing says what it is of. ``seen`` tells of values out of a
+    recording how they came to be known.
     """
 
     spec: ColumnSpec
@@ -59,6 +61,8 @@ class Shown:
     hash: str | None = None
     record: str | None = None
     twin: bool | None = None
+    recording: str = ""
+    seen: Mapping[Address, Seen] = field(default_factory=dict)
 
     @property
     def complete(self) -> bool:
@@ -177,7 +181,10 @@ class Columns:
         return self.ground.library
 
     async def _of_record(self, spec: ColumnSpec, record: SetRecord) -> Shown:
-        return self.of_set(spec, await self._library(spec).set_of(record), record.id)
+        library = self._library(spec)
+        shown = self.of_set(spec, await library.set_of(record), record.id)
+        recording, seen = await library.seen(record)
+        return replace(shown, recording=recording, seen=seen)
 
     async def _kept(self, spec: ColumnSpec) -> Shown:
         try:

@@ -11,6 +11,7 @@ from app.model.sets import iso_time
 from app.model.texts import Texts
 from app.service.compare.sources import Shown
 from app.service.compare.spec import ColumnKind
+from app.service.library.recovered import Seen
 from app.service.records.view import visible
 
 DASH: Final = "–"
@@ -65,6 +66,16 @@ class Words:
             return self.texts(f"page.compare.absence.{cell.state.value}")
         name = "" if cell.text_key is None else f" {self.texts(cell.text_key)}"
         return visible(f"{cell.shown} {cell.unit}".rstrip()) + name
+
+    def seen(self, look: Seen) -> str:
+        """``written 2026-03-04 14:03:21 UTC, by another master, before a restart``: of a value out of a recording."""
+        time = f"{iso_time(look.t_ns)[:19].replace('T', ' ')} UTC"
+        parts = [self.texts(f"page.sets.seen_{look.access.value}", time=time)]
+        if not look.ours:
+            parts.append(self.texts("page.sets.seen_foreign"))
+        if look.doubt is not None:
+            parts.append(self.texts(f"page.sets.doubt.{look.doubt.value.replace('-', '_')}"))
+        return ", ".join(parts)
 
     def state(self, row: Row) -> str:
         """``differs``."""

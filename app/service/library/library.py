@@ -8,10 +8,11 @@ from dataclasses import replace
 from typing import Any, Final
 
 from app.errors import NameplateError, SetIncompleteError, SetTagError, SetUnknownError, StoreDamagedError
+from app.model.address import Address, parse_address
 from app.model.set_head import Imported
 from app.model.set_record import SetRecord, Source, Tag, TagEntry
 from app.model.sets import ParameterSet
-from app.service.library.recovered import Recovered
+from app.service.library.recovered import Recovered, Seen
 from app.service.office.audit import Action, AuditLog
 from app.store import set_rows
 from app.store.set_rows import Filter, Nameplate
@@ -90,6 +91,11 @@ class Library:
     async def evidence(self, record: SetRecord) -> tuple[str, dict[str, Any]] | None:
         """The recording that a set comes from, and by address how its values were seen; None for other sets."""
         return await self._store.run(lambda kept: set_rows.get_evidence(kept, record.id))
+
+    async def seen(self, record: SetRecord) -> tuple[str, dict[Address, Seen]]:
+        """As ``evidence``, read; "" and nothing for sets that come from no recording."""
+        recording, kept = await self.evidence(record) or ("", {})
+        return recording, {parse_address(address): Seen.of_json(look) for address, look in kept.items()}
 
     async def take(self, imported: Imported, file: str, person: str) -> SetRecord:
         """Keep a set that was read from a file."""

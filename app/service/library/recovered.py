@@ -57,6 +57,12 @@ class Seen:
         doubt = None if self.doubt is None else self.doubt.value
         return {"t_ns": self.t_ns, "access": self.access.value, "ours": self.ours, "doubt": doubt}
 
+    @classmethod
+    def of_json(cls, kept: Mapping[str, Any]) -> Seen:
+        """As ``as_json`` gave it."""
+        doubt = None if kept["doubt"] is None else Doubt(kept["doubt"])
+        return cls(kept["t_ns"], SdoAccess(kept["access"]), kept["ours"], doubt)
+
 
 @dataclass(frozen=True, slots=True)
 class RecoveredSet:
