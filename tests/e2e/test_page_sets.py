@@ -16,6 +16,8 @@ from tests.e2e.processes import running
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(300)]
 WAIT_MS = 60_000
 expect.set_options(timeout=20_000)
+WRITE = """async (body) => (await fetch("/api/live/devices/wtg-07/blade-1/pmm/write",
+    { method: "POST", headers: { "content-type": "application/json" }, body: JSON.stringify(body) })).status"""
 FOREIGN = "address,name,raw\n6065,window,1234\n2FFF,of another maker,1\n"
 
 
@@ -147,11 +149,16 @@ def test_a_nameplate_is_typed_twice(home: tuple[str, Page]) -> None:
 def test_before_leaving_it_is_said_what_is_kept_and_then_it_is_there(home: tuple[str, Page]) -> None:
     address, page = home
     page.goto(f"{address}sets?scene=off&only=as-left")
+    for raw in (510, 500):
+        assert page.evaluate(WRITE, {"address": "3110:01", "raw": raw}) == 200
     page.get_by_test_id("connect-menu").click()
     page.get_by_test_id("visit").click()
     expect(page.get_by_test_id("as-left")).to_contain_text("of 6 devices go into the library")
-    if page.get_by_test_id("read-before-leaving").is_visible():
-        page.get_by_test_id("read-before-leaving").click()
-    expect(page.get_by_test_id("read-before-leaving")).to_have_count(0, timeout=WAIT_MS)
+    written = page.get_by_test_id("left-wtg-07/blade-1/pmm")
+    expect(written).to_have_text(re.compile(r"^Blade 1 PMM read .* ago, 2 writes since$"), timeout=WAIT_MS)
+    expect(page.get_by_test_id("left-wtg-07/blade-3/pmc")).to_contain_text("no write since")
+    page.get_by_test_id("read-before-leaving").click()
+    expect(written).to_contain_text("no write since", timeout=WAIT_MS)
+    expect(page.get_by_test_id("read-before-leaving")).to_be_enabled()
     page.get_by_test_id("end-visit").click()
     expect(rows(page).filter(has_text="as left")).to_have_count(6, timeout=WAIT_MS)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import time
 from collections.abc import AsyncIterator
 from pathlib import Path
 
@@ -94,6 +95,49 @@ async def test_a_visit_from_connecting_to_its_end(page: httpx.AsyncClient) -> No
     listed = (await page.get("/api/visits", params={"turbine": "wtg-07"})).json()
     assert [one["id"] for one in listed][1:] == [visit["id"]]
     assert (await page.get("/api/visits", params={"turbine": "wtg-99"})).json() == []
+
+
+async def leaving(page: httpx.AsyncClient) -> dict[str, dict[str, int]]:
+    """What would be kept as left, by device."""
+    return {one["device"]: one for one in (await page.get("/api/live/visit/left")).json()}
+
+
+async def read_all(page: httpx.AsyncClient) -> None:
+    job = (await page.post(f"/api/live/devices/{PMM}/read", json={"addresses": None})).json()
+    async with asyncio.timeout(2 * DEADLINE_S):
+        while job["state"] == "running":
+            await asyncio.sleep(0.05)
+            job = (await page.get(f"/api/live/jobs/{job['id']}")).json()
+    assert job["state"] == "done"
+
+
+async def test_before_leaving_the_age_of_what_would_be_kept_is_told(page: httpx.AsyncClient) -> None:
+    start_ns = time.time_ns()
+    await connect(page)
+    await all_read(page)
+    before = await leaving(page)
+    assert all(start_ns <= one["read_ns"] <= time.time_ns() and one["writes"] == 0 for one in before.values())
+    for raw in (55, 50):
+        written = await page.post(f"/api/live/devices/{PMM}/write", json={"address": "3110:01", "raw": raw})
+        assert written.is_success
+    after = await leaving(page)
+    assert {slug: one["writes"] for slug, one in after.items()} == {slug: 2 * (slug == PMM) for slug in before}
+    assert after[PMM]["read_ns"] == before[PMM]["read_ns"]
+    await read_all(page)
+    again = await leaving(page)
+    assert again[PMM]["read_ns"] > before[PMM]["read_ns"]
+    assert again[PMM]["writes"] == 0
+
+
+async def test_of_a_device_that_started_anew_the_newest_complete_set_is_told(page: httpx.AsyncClient) -> None:
+    await connect(page)
+    await all_read(page)
+    await ready(page)
+    assert (await page.post(f"/api/live/devices/{PMM}/restart", json={})).is_success
+    now = (await leaving(page))[PMM]
+    assert now["unread"] + now["stale"] == now["parameters"]
+    (found,) = (await page.get("/api/sets", params={"device": PMM})).json()["records"]
+    assert (found["unread"], now["read_ns"]) == (0, found["t_ns"])
 
 
 async def test_favourites_are_a_persons_own_list() -> None:

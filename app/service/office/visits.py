@@ -27,6 +27,7 @@ log = logging.getLogger(__name__)
 GOES_ON_NS: Final = 12 * 3600 * 1_000_000_000
 """Connecting again within so long after its beginning goes on with a visit: a shift."""
 NOT_READ: Final = "not read"
+AS_LEFT: Final = "as left"
 TAGS: Final = {Phase.FOUND: Tag.AS_FOUND, Phase.LEFT: Tag.AS_LEFT}
 STALE: Final = "stale"
 """Frames were lost, or the same quantity was written elsewhere: what was read last proves nothing."""
@@ -235,7 +236,7 @@ def as_known(
         description_id=target.description.id,
         description_version=target.description.version,
         identity=identity_of(values),
-        origin=Origin(turbine, target.slug, target.node, time, person, "as left", f"hubside {__version__}", work_order),
+        origin=Origin(turbine, target.slug, target.node, time, person, AS_LEFT, f"hubside {__version__}", work_order),
         values=values,
         unread={address: why for address, why in unread.items() if address not in empty},
         empty=tuple(address for address in unread if address in empty),

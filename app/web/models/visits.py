@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from app.service.office.last_change import Change
+from app.service.office.leaving import Leaving
 from app.service.office.visit_changes import DeviceChanges, VisitChanges
 from app.service.views import RawJson, raw_to_json
 from app.store.visit_rows import Visit
@@ -183,9 +184,27 @@ class Favourites(BaseModel):
 
 
 class LeftNow(BaseModel):
-    """How much of a device's parameters is known now: what was not read, or is stale, would not be kept as left."""
+    """How much of a device's parameters is known now: what was not read, or is stale, would not be kept as left.
+
+    ``read_ns``: since when the device has been known completely; null where it was not in this visit. ``writes``: so
+    many were seen since.
+    """
 
     device: str
     parameters: int
     unread: int
     stale: int
+    read_ns: int | None
+    writes: int
+
+    @classmethod
+    def of(cls, leaving: Leaving) -> LeftNow:
+        """As the page gets it."""
+        return cls(
+            device=leaving.device,
+            parameters=leaving.parameters,
+            unread=leaving.unread,
+            stale=leaving.stale,
+            read_ns=leaving.read_ns,
+            writes=leaving.writes,
+        )

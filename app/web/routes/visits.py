@@ -9,8 +9,8 @@ from fastapi import APIRouter, Query
 from app.model.address import parse_address
 from app.model.roles import Role
 from app.service.office.last_change import history, last_changes
+from app.service.office.leaving import before_leaving
 from app.service.office.visit_changes import changes_since_last_visit
-from app.service.office.visits import STALE, as_known
 from app.store import small_rows
 from app.web.deps import DEVICE, BenchOf, ConnectionOf, PersonOf, TargetOf, needs
 from app.web.models.visits import (
@@ -52,15 +52,11 @@ async def end_visit(bench: BenchOf, person: PersonOf, given: VisitEnd) -> VisitD
 @router.get("/live/visit/left")
 async def left_now(bench: BenchOf, connection: ConnectionOf) -> list[LeftNow]:
     """What would be kept of each device as left, were the visit ended now. Nothing is read for it."""
-    turbine, person = connection.turbine.slug, bench.options.person
-    found = []
-    for target in connection.targets:
-        known = as_known(target, turbine, person, bench.stamper(), found=bench.office.visits.found.get(target.slug))
-        parameters = [entry.address for entry in target.description if entry.is_parameter]
-        reasons = [known.unread[address] for address in parameters if address in known.unread]
-        stale = reasons.count(STALE)
-        found.append(LeftNow(device=target.slug, parameters=len(parameters), unread=len(reasons) - stale, stale=stale))
-    return found
+    office, person = bench.office, bench.options.person
+    found = await before_leaving(
+        office.visits, office.library, office.audit, connection.targets, person, bench.stamper()
+    )
+    return [LeftNow.of(one) for one in found]
 
 
 @router.get("/visits")

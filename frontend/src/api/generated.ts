@@ -3229,16 +3229,23 @@ export interface components {
         /**
          * LeftNow
          * @description How much of a device's parameters is known now: what was not read, or is stale, would not be kept as left.
+         *
+         *     ``read_ns``: since when the device has been known completely; null where it was not in this visit. ``writes``: so
+         *     many were seen since.
          */
         LeftNow: {
             /** Device */
             device: string;
             /** Parameters */
             parameters: number;
+            /** Read Ns */
+            read_ns: number | null;
             /** Stale */
             stale: number;
             /** Unread */
             unread: number;
+            /** Writes */
+            writes: number;
         };
         /**
          * LibraryDoc

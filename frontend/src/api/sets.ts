@@ -15,6 +15,7 @@ export type SetFormat = "json" | "dcf" | "csv";
 
 const FILLING_MS = 700;
 const GROWING_MS = 10_000;
+const LEAVING_MS = 3000;
 
 /** Asked again at once while files of the data folder wait to be read. */
 export const setsQuery = queryOptions({
@@ -52,6 +53,7 @@ export const leftQuery = queryOptions({
   queryKey: ["visit", "left"],
   queryFn: ({ signal }) => get<LeftNow[]>("/api/live/visit/left", signal),
   staleTime: 0,
+  refetchInterval: LEAVING_MS,
 });
 
 export const setDownload = (id: string, format: SetFormat) => `/api/sets/${id}/download?format=${format}`;
