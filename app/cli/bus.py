@@ -1,4 +1,4 @@
-"""Commands on a bus: scan, read, write, save, restart, backup, record."""
+"""Commands on a bus: scan, read, write, save, restart, record."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from app.cli.targets import (
     find_device,
 )
 from app.drivers.contract import FoundNode
-from app.errors import HubsideError, RecordingError, UnverifiedError, UsageError
+from app.errors import HubsideError, RecordingError, UnverifiedError
 from app.model.address import Address, parse_address
 from app.model.checks import Allow, check_read
 from app.model.datatypes import Raw
 from app.model.description import Entry
 from app.model.texts import error_text
 from app.model.values import show, to_scaled
-from app.service.backup import ReadReport, read_device, read_devices, readable, to_set, write_set
+from app.service.backup import ReadReport, read_device, readable
 from app.service.connection import Connection
 from app.service.devices import Target
 from app.service.save import restart, save
@@ -59,9 +59,6 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     saving.add_argument("target", help="TURBINE/STATION/DEVICE or a node number")
     restarting = command("restart", _restart, "restart a device (NMT reset node)")
     restarting.add_argument("target", help="TURBINE/STATION/DEVICE or a node number")
-    backup = command("backup", _backup, "read devices completely and write set files")
-    backup.add_argument("target", nargs="*", help="devices; all of them where none is named")
-    backup.add_argument("--reason", default="", help="why, kept in the set")
     record = command("record", _record, "record all frames to MCAP until interrupted")
     record.add_argument("--seconds", type=seconds, help="end by itself after so long")
 
@@ -112,7 +109,7 @@ def _found_dict(node: FoundNode, description: str | None) -> dict[str, Any]:
 async def _read(arguments: argparse.Namespace, output: Output) -> int:
     addresses = [parse_address(text) for text in arguments.address]
     async with connected(arguments, output) as connection:
-        target = _target(connection, arguments.target)
+        target = target_of(connection, arguments.target)
         for address in addresses:
             check_read(target.entry(address))
         started = time.monotonic()
@@ -129,18 +126,18 @@ async def _read(arguments: argparse.Namespace, output: Output) -> int:
     else:
         rows = [_value_row(target, target.entry(address), raw, output) for address, raw in report.values.items()]
         output.table(("ADDRESS", "NAME", "VALUE", "UNIT", "RAW"), rows)
-    _say_unread(report, output)
+    say_unread(report, output)
     took = f"{time.monotonic() - started:.2f}"
     output.say("cli.read_done", device=target.slug, count=len(report.values), took_s=took)
-    return _exit_code(report.failed if addresses else report.errors)
+    return exit_code(report.failed if addresses else report.errors)
 
 
-def _exit_code(failed: Mapping[Address, HubsideError]) -> int:
+def exit_code(failed: Mapping[Address, HubsideError]) -> int:
     """0 where nothing failed, else that of the worst: no answer before a refusal."""
     return max((error.exit_code for error in failed.values()), default=0)
 
 
-def _say_unread(report: ReadReport, output: Output) -> None:
+def say_unread(report: ReadReport, output: Output) -> None:
     """Name every object that was not read; those that hold nothing yet (an empty error history) in one line."""
     if report.lost is not None:
         output.error(report.lost)
@@ -184,7 +181,7 @@ def _json_value(target: Target, address: Any, raw: Raw) -> dict[str, Any]:
 async def _write(arguments: argparse.Namespace, output: Output) -> int:
     address = parse_address(arguments.address)
     async with connected(arguments, output) as connection:
-        target = _target(connection, arguments.target)
+        target = target_of(connection, arguments.target)
         entry = target.entry(address)
         async with audited(arguments, output, connection):
             try:
@@ -225,7 +222,7 @@ def _tell_written(target: Target, entry: Entry, result: WriteResult, output: Out
 
 async def _save(arguments: argparse.Namespace, output: Output) -> int:
     async with connected(arguments, output) as connection:
-        target = _target(connection, arguments.target)
+        target = target_of(connection, arguments.target)
         async with audited(arguments, output, connection):
             await _save_one(connection, target, output)
     return 0
@@ -239,47 +236,12 @@ async def _save_one(connection: Connection, target: Target, output: Output) -> N
 
 async def _restart(arguments: argparse.Namespace, output: Output) -> int:
     async with connected(arguments, output) as connection:
-        target = _target(connection, arguments.target)
+        target = target_of(connection, arguments.target)
         async with audited(arguments, output, connection):
             took = await restart(connection.driver(target), target, connection.journal, connection.stamper)
         text = output.texts("cli.restart_done", device=target.slug, took_s=f"{took.took_s:.2f}")
         output.result({"device": target.slug, "took_s": took.took_s}, text)
     return 0
-
-
-async def _backup(arguments: argparse.Namespace, output: Output) -> int:
-    settings = arguments.settings
-    async with connected(arguments, output) as connection:
-        targets = [_target(connection, one) for one in arguments.target] or list(connection.targets)
-        if not targets:
-            raise UsageError(reason="no device with a known description was found")
-        started = time.monotonic()
-        reports = await read_devices(
-            [(connection.driver(target), target) for target in targets],
-            lambda one, done, total: output.progress("cli.reading", device=one.slug, done=done, total=total),
-        )
-        took = f"{time.monotonic() - started:.2f}"
-    code = 0
-    for report in reports:
-        target = report.target
-        code = max(code, _exit_code(report.errors))
-        if not report.values or report.lost is not None:
-            output.error(report.lost or next(iter(report.failed.values())))
-            output.say("cli.no_set", device=target.slug)
-            continue
-        parameters = to_set(report, connection.turbine.slug, settings.person, arguments.reason, time.time_ns())
-        path = write_set(settings.sets / connection.turbine.slug, parameters)
-        _say_unread(report, output)
-        details = {
-            "file": str(path),
-            "count": len(report.values),
-            "unread": len(report.errors),
-            "hash": parameters.hash,
-        }
-        short = details | {"hash": parameters.hash[:12]}
-        output.result({"device": target.slug, **details}, output.texts("cli.set_written", **short))
-        output.say("cli.read_done", device=target.slug, count=len(report.values), took_s=took)
-    return code
 
 
 async def _record(arguments: argparse.Namespace, output: Output) -> int:
@@ -315,5 +277,6 @@ async def _show_recording(connection: Connection, output: Output, stop: asyncio.
             await asyncio.wait_for(stop.wait(), 0.5)
 
 
-def _target(connection: Connection, name: str) -> Target:
+def target_of(connection: Connection, name: str) -> Target:
+    """The device that is meant. Raises UsageError."""
     return connection.target(find_device(connection.turbine, name).slug)

@@ -25,7 +25,8 @@ from app.settings import settings_from
 COMMANDS: Final = {
     "od": ("od",),
     "twin": ("twin",),
-    "bus": ("scan", "read", "write", "save", "restart", "backup", "record"),
+    "bus": ("scan", "read", "write", "save", "restart", "record"),
+    "backup": ("backup",),
     "restore": ("restore",),
     "recordings": ("export", "recover"),
     "sets": ("sets",),

@@ -6,15 +6,19 @@ row counts.
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
+import sqlite3
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any
 
 from sqlalchemy import Connection as Connection
 from sqlalchemy import Row, Select, delete, func, insert, select
 
+from app.errors import StoreError
 from app.model.address import parse_address
 from app.model.set_record import SetRecord, Source, Tag, TagEntry
 from app.model.sets import Identity, Origin, ParameterSet, iso_time, parse_content
@@ -195,6 +199,19 @@ def nameplates_now(connection: Connection) -> dict[str, Nameplate]:
     """What is known of each device, by slug."""
     query = select(nameplates).order_by(nameplates.c.seq)
     return {row.device: Nameplate(row.device, row.serial, row.person, row.t_ns) for row in connection.execute(query)}
+
+
+def peek_nameplates(path: Path) -> dict[str, Nameplate]:
+    """As ``nameplates_now``, of a store that another process has: it is read and nothing else. Raises StoreError."""
+    columns = "device, serial, person, t_ns"
+    try:
+        with contextlib.closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True)) as file:
+            if not file.execute("SELECT 1 FROM sqlite_schema WHERE name = 'nameplates'").fetchone():
+                return {}  # a store of an earlier version knows none
+            rows = file.execute(f"SELECT {columns} FROM nameplates ORDER BY seq").fetchall()
+    except sqlite3.Error as error:
+        raise StoreError(file=str(path), reason=str(error)) from error
+    return {row[0]: Nameplate(*row) for row in rows}
 
 
 # -- files ------------------------------------------------------------------------------

@@ -193,7 +193,11 @@ class Library:
 
     def identified(self, parameters: ParameterSet) -> ParameterSet:
         """The set with the nameplate of its device, where the device itself tells no serial number."""
-        plate = self._plates.get(parameters.origin.device)
-        if plate is None or parameters.identity.serial:
-            return parameters
-        return replace(parameters, identity=replace(parameters.identity, nameplate=plate.serial))
+        return with_plate(parameters, self._plates.get(parameters.origin.device))
+
+
+def with_plate(parameters: ParameterSet, plate: Nameplate | None) -> ParameterSet:
+    """The set with what was typed of the device's plate, where the device itself tells no serial number."""
+    if plate is None or parameters.identity.serial:
+        return parameters
+    return replace(parameters, identity=replace(parameters.identity, nameplate=plate.serial))
