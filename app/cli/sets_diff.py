@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import AsyncIterator, Iterator, Sequence
+from collections.abc import AsyncIterator, Sequence
 from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
+from app.cli.compared import compared_json, matters, tell_text
 from app.cli.connecting import connected, run_command, sheets_of
 from app.cli.output import Output
-from app.cli.sets_seen import mark, tell_legend
 from app.cli.targets import add_connection, descriptions_for
 from app.cli.users import opened
 from app.errors import UsageError
-from app.model.diff.column import Cell
-from app.model.diff.compare import Row, RowState
 from app.model.sets import ParameterSet
 from app.model.site import load_site
 from app.service.backup import read_devices, to_set
@@ -25,14 +23,12 @@ from app.service.compare.comparison import Compared, compare_columns
 from app.service.compare.export import to_csv, to_html
 from app.service.compare.ground import Ground
 from app.service.compare.sources import Columns
-from app.service.compare.spec import ColumnKind, ColumnSpec, parse_spec
-from app.service.compare.wording import Words, rows_of
+from app.service.compare.spec import ColumnKind, ColumnSpec, Unresolved, parse_spec
+from app.service.compare.wording import Words
 from app.service.connection import Connection
 from app.service.library.library import Library
-from app.service.library.recovered import Seen
 from app.service.office.visits import Visits
 from app.service.sites import Sites
-from app.service.views import raw_to_json
 
 DIFFERENT: Final = 1
 """Exit code where a value differs that must not, is missing, or cannot be compared; as ``diff`` has it."""
@@ -46,7 +42,6 @@ _STORE: Final = (
     ColumnKind.LEFT,
     ColumnKind.YEAR,
 )
-_MATTER: Final = (RowState.DIFFERENT, RowState.MISSING, RowState.NOT_COMPARABLE)
 
 
 def add_actions(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -79,8 +74,7 @@ async def _diff(arguments: argparse.Namespace, output: Output) -> int:
         ground, specs = await _ground(arguments, output, specs, stack)
         compared = await compare_columns(Columns(ground), [str(one) for one in specs], everything=arguments.all)
     _tell(arguments, output, compared)
-    rows, summary = compared.comparison.rows, compared.comparison.summary
-    return DIFFERENT if summary.undescribed_different or any(row.state in _MATTER for row in rows) else 0
+    return DIFFERENT if matters(compared) else 0
 
 
 def _spec(text: str) -> ColumnSpec:
@@ -88,7 +82,10 @@ def _spec(text: str) -> ColumnSpec:
     kinds = {kind.value for kind in ColumnKind}
     if text.partition(":")[0] not in kinds and Path(text).is_file():
         return ColumnSpec(ColumnKind.FILE, text)
-    return parse_spec(text)
+    spec = parse_spec(text)
+    if spec.kind is ColumnKind.EDITOR:  # it would be plain RAM: what is typed there is in somebody's browser
+        raise Unresolved.NO_EDITOR.error(text)
+    return spec
 
 
 async def _ground(
@@ -154,7 +151,7 @@ async def _read(
 def _tell(arguments: argparse.Namespace, output: Output, compared: Compared) -> None:
     words = Words(output.texts)
     if output.as_json:
-        output.result(_as_json(compared, words, arguments.same), "")
+        output.result(compared_json(compared, words, arguments.same), "")
     elif arguments.csv:
         output.raw(to_csv(compared, output.texts, arguments.same))
     elif arguments.html is not None and str(arguments.html) == "-":
@@ -163,78 +160,4 @@ def _tell(arguments: argparse.Namespace, output: Output, compared: Compared) -> 
         arguments.html.write_text(to_html(compared, output.texts, arguments.same), encoding="utf-8")
         output.line(words.sentence(compared.comparison.summary))
     else:
-        _tell_text(output, compared, words, arguments.same)
-
-
-def _tell_text(output: Output, compared: Compared, words: Words, same: bool) -> None:
-    for number, one in enumerate(compared.columns, 1):
-        output.line(f"({number}) {words.title(one)}: {', '.join(words.circumstances(one))}")
-    rows = rows_of(compared.comparison.rows, same)
-    if rows:
-        head = ("ADDRESS", "NAME", "STATE", *(f"({number + 1})" for number in range(len(compared.columns))))
-        table = [(row.address.short, words.name(row), words.state(row), *_cells(row, compared, words)) for row in rows]
-        output.table(head, table)
-    for one in compared.columns:
-        if one.seen:
-            tell_legend(output, one.recording)
-    for line in _findings(compared, words):
-        output.line(line)
-    output.line(words.sentence(compared.comparison.summary))
-
-
-def _cells(row: Row, compared: Compared, words: Words) -> Iterator[str]:
-    """The values, each with its mark where it comes out of a recording."""
-    for cell, one in zip(row.cells, compared.columns, strict=True):
-        look = one.seen.get(row.address)
-        yield words.value(cell) + ("" if look is None else f"  [{mark(look)}]")
-
-
-def _findings(compared: Compared, words: Words) -> Iterator[str]:
-    for row in compared.comparison.rows:
-        for rule, numbers in compared.findings.get(row.address, {}).items():
-            which = " ".join(f"({number + 1})" for number in numbers)
-            yield f"! {row.address.short} {which}: {words.texts(f'rule.{rule}.title')}"
-
-
-def _as_json(compared: Compared, words: Words, same: bool) -> dict[str, Any]:
-    summary = compared.comparison.summary
-    return {
-        "columns": [
-            {
-                "spec": str(one.spec),
-                "device": one.column.slug,
-                "t_ns": one.t_ns,
-                "hash": one.hash,
-                "twin": one.twin,
-                "recording": one.recording or None,
-            }
-            for one in compared.columns
-        ],
-        "summary": {name: getattr(summary, name) for name in summary.__dataclass_fields__},
-        "sentence": words.sentence(summary),
-        "rows": [
-            {
-                "address": row.address.short,
-                "name": row.entry.title,
-                "state": row.state.value,
-                "class": row.entry.restore.value,
-                "cells": [
-                    _cell_json(cell, one.seen.get(row.address))
-                    for cell, one in zip(row.cells, compared.columns, strict=True)
-                ],
-                "findings": list(compared.findings.get(row.address, {})),
-            }
-            for row in rows_of(compared.comparison.rows, same)
-        ],
-    }
-
-
-def _cell_json(cell: Cell, look: Seen | None) -> dict[str, Any]:
-    """``seen`` null: the value comes out of no recording."""
-    return {
-        "state": cell.state.value,
-        "raw": None if cell.raw is None else raw_to_json(cell.raw),
-        "shown": cell.shown,
-        "unit": cell.unit,
-        "seen": None if look is None else look.as_json(),
-    }
+        tell_text(output, compared, words, arguments.same)

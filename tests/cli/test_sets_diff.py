@@ -6,6 +6,7 @@ import asyncio
 import csv
 import io
 import json
+import re
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -118,10 +119,14 @@ def test_no_head_of_the_csv_file_is_a_formula(tmp_path: Path, capsys: Captured) 
         (["default:wtg-07/blade-1/pmm"], "default:wtg-07/blade-1/pmm"),
         (["nothing.json"], "nothing.json"),
         (["live:1"], "--site"),
+        (["editor:wtg-07/blade-1/pmm"], "The editor is in the page"),
         ([], "2 to 12"),
     ],
 )
-def test_a_column_that_is_not_there_is_named(tmp_path: Path, capsys: Captured, columns: list[str], named: str) -> None:
+def test_a_column_that_is_not_there_is_named(
+    tmp_path: Path, capsys: Captured, monkeypatch: pytest.MonkeyPatch, columns: list[str], named: str
+) -> None:
+    monkeypatch.setenv("HUBSIDE_LANGUAGE", "en")
     there = file(tmp_path, BEFORE, "before.json")
     assert main(["--data", str(tmp_path / "data"), "sets", "diff", there, *columns]) == 2
     assert named in capsys.readouterr().err
@@ -162,3 +167,11 @@ def test_a_device_is_held_against_a_file(served: Served, tmp_path: Path) -> None
     row = next(one for one in done.json["rows"] if one["address"] == "3110:01")
     assert [cell["raw"] for cell in row["cells"]] == [500, 480, None]
     assert row["cells"][2]["state"] == "unread", "nobody has seen the device boot: what is stored is not known"
+    notes = [one["note"] for one in done.json["columns"]]
+    assert notes[:2] == [None, None]
+    assert re.fullmatch(r"No device tells .*: of [1-9]\d+ saved values 0 are known, from a save or .*", notes[2])
+    page = tmp_path / "page.html"
+    told = hubside("sets", "diff", "live:1", f"stored:{SLUG}", *site, "--html", str(page))
+    assert told.code == 1 and notes[2] in page.read_text(encoding="utf-8")
+    told = hubside("sets", "diff", "live:1", f"stored:{SLUG}", *site)
+    assert told.out.splitlines()[2].strip() == notes[2], "below its column"

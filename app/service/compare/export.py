@@ -65,10 +65,16 @@ def to_html(compared: Compared, texts: Texts, same: bool = False) -> str:
 <body>
 <h1>{escape(title)}</h1>
 <p class="sum">{escape(words.sentence(compared.comparison.summary))}</p>
-{nothing}{groups}<footer>Hubside {escape(__version__)}</footer>
+{_notes(compared, words)}{nothing}{groups}<footer>Hubside {escape(__version__)}</footer>
 </body>
 </html>
 """
+
+
+def _notes(compared: Compared, words: Words) -> str:
+    """What must be known of a column to read it."""
+    told = [(words.title(one), words.note(one)) for one in compared.columns]
+    return "".join(f"<p>{escape(title)}: {escape(note)}</p>\n" for title, note in told if note)
 
 
 def _group(title: str, rows: list[Row], compared: Compared, words: Words) -> str:

@@ -49,6 +49,7 @@ class Unresolved(Enum):
     NO_DESCRIPTION = "no-description"
     NO_OBJECT = "no-object"
     NOT_HERE = "not-here"
+    NO_EDITOR = "no-editor"
 
     def error(self, column: str, **details: str) -> ColumnError:
         """The error that says so of ``column``."""

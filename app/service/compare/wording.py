@@ -60,6 +60,13 @@ class Words:
         parts = (when, shown.person, shown.reason, described, digest, unread, twin)
         return [visible(part) for part in parts if part]
 
+    def note(self, shown: Shown) -> str:
+        """What must be known of a column to read it, in one sentence; empty where nothing must."""
+        if shown.spec.kind is not ColumnKind.STORED:
+            return ""
+        known, unread = len(shown.column.values), len(shown.column.unread)
+        return self.texts("compare.stored", known=known, all=known + unread)
+
     def value(self, cell: Cell) -> str:
         """A cell with its unit, or why there is no value."""
         if cell.state is not CellState.VALUE:
