@@ -1,7 +1,7 @@
 """``hubside``: reads the command line, runs one use case, turns errors into exit codes.
 
 Exit codes: 0 done, 2 usage, 3 refused before sending, 4 refused by the device, 5 no answer, 6 sent but not verified;
-1 where `sets diff` found a difference.
+1 where `sets diff` or `sets parity` found a difference.
 """
 
 from __future__ import annotations

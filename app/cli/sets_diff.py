@@ -92,9 +92,9 @@ async def _ground(
     arguments: argparse.Namespace, output: Output, specs: Sequence[ColumnSpec], stack: AsyncExitStack
 ) -> tuple[Ground, list[ColumnSpec]]:
     """What the columns need is opened, and nothing else; the specs name devices by their slugs then."""
-    ground = Ground(time.time_ns, sites=_sites(arguments, output), files=True)
+    ground = Ground(time.time_ns, sites=sites_of(arguments, output), files=True)
     if any(one.kind in _STORE for one in specs):
-        library, visits = await stack.enter_async_context(_kept(arguments))
+        library, visits = await stack.enter_async_context(kept(arguments))
         ground = replace(ground, library=library, visits=visits)
     if any(one.kind in _BUS for one in specs):
         if arguments.site is None and arguments.can is None:
@@ -103,12 +103,12 @@ async def _ground(
         connection = await stack.enter_async_context(connected(arguments, output))
         specs = [_by_slug(one, connection) for one in specs]
         wanted = {one.of for one in specs if one.kind in _BUS}
-        read = await _read(arguments, output, connection, wanted)
+        read = await read_whole(arguments, output, connection, wanted)
         ground = replace(ground, targets=tuple(connection.targets), read=read)
     return ground, list(specs)
 
 
-def _sites(arguments: argparse.Namespace, output: Output) -> Sites | None:
+def sites_of(arguments: argparse.Namespace, output: Output) -> Sites | None:
     """The turbines of the site file, where one is named. Raises SiteError, DescriptionError."""
     if arguments.site is None:
         return None
@@ -117,7 +117,7 @@ def _sites(arguments: argparse.Namespace, output: Output) -> Sites | None:
 
 
 @asynccontextmanager
-async def _kept(arguments: argparse.Namespace) -> AsyncIterator[tuple[Library, Visits]]:
+async def kept(arguments: argparse.Namespace) -> AsyncIterator[tuple[Library, Visits]]:
     """The library of the data folder. Raises StoreInUseError while a server has it, StoreError."""
     async with opened(arguments) as (store, audit):
         library = Library(store, audit, time.time_ns)
@@ -130,7 +130,7 @@ def _by_slug(spec: ColumnSpec, connection: Connection) -> ColumnSpec:
     return spec if device is None else ColumnSpec(spec.kind, device.slug)
 
 
-async def _read(
+async def read_whole(
     arguments: argparse.Namespace, output: Output, connection: Connection, wanted: set[str]
 ) -> dict[str, ParameterSet]:
     """Read the devices completely, as a backup does. Raises BusLostError, NoAnswerError."""

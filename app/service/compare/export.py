@@ -133,20 +133,20 @@ def to_csv(compared: Compared, texts: Texts, same: bool = False) -> str:
     for one in compared.columns:
         head += [words.title(one), f"{words.title(one)}: raw"]
         head += [f"{words.title(one)}: {words.texts('compare.seen')}"] if one.seen else []
-    writer.writerow(map(_harmless, head))
+    writer.writerow(map(harmless, head))
     for row in rows_of(compared.comparison.rows, same):
         rules = " ".join(compared.findings.get(row.address, {}))
         group, restore = words.group(row), row.entry.restore.value
         cells = list(_csv_cells(row, compared, words))
         fixed = [row.address.short, "", words.name(row), group, restore, row.state.value, rules]
-        writer.writerow(map(_harmless, [*fixed, *cells]))
+        writer.writerow(map(harmless, [*fixed, *cells]))
         for bit in row.bits:
             if bit.differs:
                 cells = []
                 for number, one in zip(bit.values, compared.columns, strict=True):
                     cells += [words.bit_value(bit, number), _raw(number), *([""] if one.seen else [])]
                 fixed = [row.address.short, str(bit.bit), words.bit(bit), group, restore, "different", ""]
-                writer.writerow(map(_harmless, [*fixed, *cells]))
+                writer.writerow(map(harmless, [*fixed, *cells]))
     return out.getvalue()
 
 
@@ -166,7 +166,7 @@ def _raw(raw: Raw | None) -> str:
     return raw.hex() if isinstance(raw, bytes) else str(raw)
 
 
-def _harmless(text: str) -> str:
+def harmless(text: str) -> str:
     """A text of elsewhere that a spreadsheet would take for a formula, as plain text; numbers stay numbers."""
     number = text.replace(".", "", 1).removeprefix("-").isdecimal()
     return f"'{text}" if text[:1] in ("=", "+", "-", "@", "\t") and not number else text

@@ -99,9 +99,13 @@ class Words:
 
     def group(self, row: Row) -> str:
         """The group that it belongs to."""
-        key = f"group.{row.entry.group}"
+        return self.group_name(row.entry.group)
+
+    def group_name(self, group: str) -> str:
+        """What people call a group."""
+        key = f"group.{group}"
         words = self.texts(key)
-        return row.entry.group if words == key else words
+        return group if words == key else words
 
     def bit(self, bit: BitRow) -> str:
         """A bit with its clamp."""
