@@ -27,6 +27,7 @@ from app.drivers.contract import (
 from app.drivers.listening import BusWatch
 from app.drivers.sdo_client import DEFAULT_TIMEOUT_NS, Job, SdoClient
 from app.drivers.sdo_jobs import Counters, Steps, read_steps, write_steps
+from app.drivers.urgent import UrgentCommands
 from app.errors import BusLostError, ConsentError, HubsideError, NoAnswerError, RefusedError, UsageError
 from app.model.address import Address
 from app.model.description import Description, Verify
@@ -78,7 +79,8 @@ class CanOpenDriver:
         self._timeouts_ns: dict[int, dict[Address, int]] = {}
         self._port = CanPort(config.listening(True), bus, stamper, self.watch.on_frames, monotonic_ns=monotonic_ns)
         self._port.gather_s = GATHER_S
-        self._client = SdoClient(self._port, monotonic_ns)
+        self._commands = UrgentCommands()
+        self._client = SdoClient(self._port, monotonic_ns, self._commands)
         self._port.add_listener(self._client.on_frames, first=True)
         self._port.add_status_listener(self._on_status)
 
@@ -244,23 +246,37 @@ class CanOpenDriver:
         timeout_s: float | None = None,
         verify: Verify = Verify.EQUAL,
         urgent: bool = False,
+        known: int | None = None,
     ) -> Written:
         """See Driver. By SDO download; a write to 1010h or 1011h waits at least 10 s for its acknowledge."""
         self._require_active(node, asked=not urgent)
+        if urgent:
+            self._commands.note(node, address)
         wait_ns = _timeout_ns(timeout_s, self._timeouts_ns.get(node, {}).get(address))
         if address.major in _SLOW:
             wait_ns = max(wait_ns, SAVE_TIMEOUT_NS)
-        steps = write_steps(node, address, data, wait_ns, DEFAULT_TIMEOUT_NS, verify, self._client.counters, self.bus)
+        counters = self._client.counters
+        steps = write_steps(node, address, data, wait_ns, DEFAULT_TIMEOUT_NS, verify, counters, self.bus, known)
         return await self._run(node, steps, urgent)
+
+    def commanded(self, node: int, address: Address) -> int:
+        """See Driver."""
+        return self._commands.count(node, address)
+
+    def command_raw(self, node: int, address: Address, can: Can) -> bool:
+        """Send a command to ``address`` of ``node`` as one frame past all queues, without consent (STOP by RPDO).
+
+        False where a write of ours may still be executed after it; then it has to be written as well.
+        Raises BusLostError, RefusedError.
+        """
+        self._commands.note(_checked(node), address)
+        self._port.send(can)
+        return not self._client.may_still_write(node, address)
 
     def abort_current(self, node: int) -> None:
         """Abort the transfer that runs at ``node``; its caller gets NoAnswerError."""
         _checked(node)
         self._port.call_soon(lambda: self._client.abort_current(node))
-
-    def send_raw(self, can: Can) -> None:
-        """Send one frame past all queues, without consent (STOP by RPDO). Raises BusLostError, RefusedError."""
-        self._port.send(can)
 
     # -- network management -------------------------------------------------------
 

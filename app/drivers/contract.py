@@ -136,12 +136,18 @@ class Driver(Protocol):
         timeout_s: float | None = None,
         verify: Verify = Verify.EQUAL,
         urgent: bool = False,
+        known: int | None = None,
     ) -> Written:
         """Write once. Without an answer the object is read, and that decides where ``verify`` is EQUAL.
 
         ``urgent`` goes before all that waits for the node, interrupts what runs, and needs no consent (STOP).
-        Raises UnverifiedError where it was sent and its outcome is open or another than wanted.
+        ``known``: what ``commanded`` said when the write was decided on; where an urgent one has come since, nothing
+        is sent (OvertakenError). Raises UnverifiedError where it was sent and its outcome is open or another than
+        wanted.
         """
+
+    def commanded(self, node: int, address: Address) -> int:
+        """How many urgent commands went to the object so far."""
 
     async def restart(self, node: int, timeout_s: float = 10.0) -> None:
         """Restart the device and wait until it says that it is back. Raises NoAnswerError."""

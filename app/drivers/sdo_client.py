@@ -21,6 +21,7 @@ from typing import Any, Final, Generic, Protocol, TypeVar
 from app.drivers.sdo_jobs import Counters, End, Steps, WriteStep
 from app.drivers.sdo_transfer import Kind, Step, Transfer, Upload
 from app.drivers.sdo_unanswered import Claim, Unanswered
+from app.drivers.urgent import UrgentCommands
 from app.errors import BusLostError, HubsideError, NoAnswerError, RefusedError
 from app.model.address import Address
 from app.wire import sdo
@@ -240,8 +241,20 @@ class _Channel:
         if self.unanswered:
             alike = self.unanswered.alike(transfer, self.client.now_ns())
             self.sure = alike is None or alike.flushed
+        known = transfer.known if isinstance(transfer, WriteStep) else None
+        commands = self.client.commands
+        if known is None:
+            self._transmit(transfer)
+        elif not commands.send_unless(self.node, transfer.address, known, lambda: self._transmit(transfer)):
+            self._overtaken()
+            return
         self.client.counters.transfers += 1
-        self._transmit(transfer)
+
+    def _overtaken(self) -> None:
+        """What was about to be sent would undo an urgent command: its job is told, and nothing is sent."""
+        self.transfer = None
+        if self.job is not None:
+            self._continue(self.job, End.OVERTAKEN)
 
     def _transmit(self, transfer: Transfer) -> None:
         client = self.client
@@ -332,18 +345,23 @@ class _Channel:
 
     def _give_up(self, code: int) -> None:
         transfer = self.transfer
+        if transfer is not None:
+            self.unanswered.remember(transfer, self.client.now_ns())  # first: it is on its way until it stands there
         self.transfer = self.wanted = None
         if transfer is not None:
-            self.unanswered.remember(transfer, self.client.now_ns())
             self.client.port.send(Can(self.request_id, transfer.abort(code)))
 
 
 class SdoClient:
-    """SDO client of one bus. All methods run on the receive thread of ``port``; ``now_ns`` is its monotonic clock."""
+    """SDO client of one bus. All methods run on the receive thread of ``port``; ``now_ns`` is its monotonic clock.
 
-    def __init__(self, port: Port, now_ns: Callable[[], int]) -> None:
+    ``commands`` are those that a write must not follow (``WriteStep.known``).
+    """
+
+    def __init__(self, port: Port, now_ns: Callable[[], int], commands: UrgentCommands | None = None) -> None:
         self.port = port
         self.now_ns = now_ns
+        self.commands = commands or UrgentCommands()
         self.counters = Counters()
         self._channels = {node: _Channel(self, node) for node in range(1, 128)}
         self._by_response = {sdo.RESPONSE_BASE + node: channel for node, channel in self._channels.items()}
@@ -356,6 +374,13 @@ class SdoClient:
     def cancel(self, node: int, job: Job[Any]) -> None:
         """Drop ``job``; a transfer of it that is on the wire is aborted. Its ``on_done`` is not called."""
         self._guarded(self._channels[node].cancel, job)
+
+    def may_still_write(self, node: int, address: Address) -> bool:
+        """Whether a write of ours is on its way to the object, or was given up without an answer. From any thread."""
+        channel, wanted = self._channels[node], (sdo.upload_request(address)[1:4], Kind.DOWNLOAD)
+        transfer = channel.transfer
+        on_its_way = transfer is not None and (transfer.mux, transfer.kind) == wanted
+        return on_its_way or channel.unanswered.owes(*wanted)
 
     def abort_current(self, node: int) -> None:
         """Abort the transfer that runs at ``node``, if any; its job ends with NoAnswerError."""

@@ -12,7 +12,15 @@ from typing import Final, TypeVar
 
 from app.drivers.contract import Written
 from app.drivers.sdo_transfer import Download, Transfer, Upload
-from app.errors import BusLostError, HubsideError, NoAnswerError, ProtocolError, SdoAbortError, UnverifiedError
+from app.errors import (
+    BusLostError,
+    HubsideError,
+    NoAnswerError,
+    OvertakenError,
+    ProtocolError,
+    SdoAbortError,
+    UnverifiedError,
+)
 from app.model.address import Address
 from app.model.description import Verify
 from app.wire import sdo
@@ -31,6 +39,8 @@ class End(Enum):
     """Sent, then given up for something urgent."""
     SILENT = "silent"
     """Not sent at all: the node answered nothing, not even the fence."""
+    OVERTAKEN = "overtaken"
+    """Not sent at all: an urgent command went to the object after the write was asked for."""
     LOST = "lost"
     """The bus is gone."""
 
@@ -126,13 +136,17 @@ def _read_error(node: int, transfer: Transfer, end: End, bus: str) -> HubsideErr
 
 
 class WriteStep(Download):
-    """A download that knows whether its acknowledge could be that of an earlier, given up write to the same object."""
+    """A download that knows whether its acknowledge could be that of an earlier, given up write to the same object.
 
-    __slots__ = ("doubtful",)
+    ``known``: urgent commands to the object that it may follow; after another one it is not sent. None: it is sent.
+    """
 
-    def __init__(self, address: Address, timeout_ns: int, data: bytes) -> None:
+    __slots__ = ("doubtful", "known")
+
+    def __init__(self, address: Address, timeout_ns: int, data: bytes, known: int | None = None) -> None:
         super().__init__(address, timeout_ns, data)
         self.doubtful = False
+        self.known = known
 
 
 def write_steps(
@@ -144,18 +158,22 @@ def write_steps(
     verify: Verify,
     counters: Counters,
     bus: str = "",
+    known: int | None = None,
 ) -> Steps[Written]:
-    """Write once, never twice. Without a clear answer the object is read and that decides.
+    """Write once, never twice. Without a clear answer the object is read and that decides. ``known``: see WriteStep.
 
     Raises SdoAbortError (refused, even where the refusal came late), UnverifiedError (sent, but the object holds
-    something else, or its outcome cannot be read), NoAnswerError (the node is silent), BusLostError.
+    something else, or its outcome cannot be read), NoAnswerError (the node is silent), OvertakenError (not sent: an
+    urgent command came first), BusLostError.
     """
-    transfer = WriteStep(address, timeout_ns, data)
+    transfer = WriteStep(address, timeout_ns, data, known)
     end = yield transfer
     if end is End.DONE and not (transfer.doubtful and verify is Verify.EQUAL):
         return Written.ACKNOWLEDGED
     if end is End.REFUSED:
         raise abort_error(node, address, transfer.abort_code)
+    if end is End.OVERTAKEN:
+        raise OvertakenError(bus=bus, node=node, address=address.short)
     if end is End.SILENT:
         raise NoAnswerError(node=node, address=str(address), timeout_s=timeout_ns / 1e9)
     if end is End.LOST:

@@ -72,6 +72,11 @@ class Unanswered:
         """Whether such a request was given up."""
         return (mux, kind) in self._entries
 
+    def owes(self, mux: bytes, kind: Kind) -> bool:
+        """Whether such a request may not have been executed yet. From any thread."""
+        entry = self._entries.get((mux, kind))
+        return entry is not None and not entry.flushed
+
     def remember(self, transfer: Transfer, now_ns: int) -> None:
         """``transfer`` is given up."""
         key = (transfer.mux, transfer.kind)

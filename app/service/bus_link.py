@@ -153,7 +153,8 @@ class BusLink:
     def send_pdo(self, node: int, address: Address, data: bytes) -> bool:
         """Send ``data`` by the receive PDO of ``node`` that carries ``address`` and nothing else.
 
-        False where the node is not operational or no such PDO is in force: then nothing was sent. Raises BusLostError.
+        False where it has to be written as well: the node is not operational, no such PDO is in force (nothing was
+        sent then), or an earlier write of ours to the object may be executed only now. Raises BusLostError.
         """
         view = self._live.node(self.name, node)
         if view is None or view.state is not NmtState.OPERATIONAL or view.silent:
@@ -161,6 +162,5 @@ class BusLink:
         for route in self.pdos(node):
             entries = route.mapping.entries
             if route.source is Source.PDO_RX and len(entries) == 1 and entries[0] == (address, 8 * len(data)):
-                self.driver.send_raw(Can(route.can_id, data, route.extended))
-                return True
+                return bool(self.driver.command_raw(node, address, Can(route.can_id, data, route.extended)))
         return False

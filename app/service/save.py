@@ -48,10 +48,20 @@ async def save(
 
 
 async def restart(
-    driver: Driver, target: Target, journal: Journal, now_ns: Callable[[], int], timeout_s: float = 15.0
+    driver: Driver,
+    target: Target,
+    journal: Journal,
+    now_ns: Callable[[], int],
+    timeout_s: float = 15.0,
+    sure: Callable[[], None] | None = None,
 ) -> Took:
-    """Restart the device (NMT reset node) and wait for its boot-up message. Raises NoAnswerError."""
+    """Restart the device (NMT reset node) and wait for its boot-up message. Raises NoAnswerError.
+
+    ``sure`` raises what speaks against it at the last moment: nothing else comes between it and the command.
+    """
     target.gate.check(target.device)
+    if sure is not None:
+        sure()
     started_ns = now_ns()
     journal.note(Kind.RESTART, target.slug)
     await driver.restart(target.node, timeout_s)

@@ -1,8 +1,10 @@
 """STOP and FEATHER: to every axis of the live connection, on the shortest path there is.
 
 Where the node is operational and an RPDO carries the controlword alone, one frame does it. Otherwise our running
-transfer to that node is aborted and 6040h is written by SDO, ahead of everything that waits. No lock, lease, consent or
-error of another axis holds them back. This is not a safety function.
+transfer to that node is aborted and 6040h is written by SDO, ahead of everything that waits. A write of 6040h that was
+asked for before and has not left yet does not leave any more; after one that has left the command goes by SDO too, for
+a device works these in their order. No lock, lease, consent or error of another axis holds them back. This is not a
+safety function.
 """
 
 from __future__ import annotations
@@ -52,7 +54,7 @@ class AxisOutcome:
 
 @dataclass(frozen=True, slots=True)
 class Axis:
-    """An axis and how it is reached. ``by_rpdo`` sends the controlword as a PDO, or says False where it cannot."""
+    """An axis and how it is reached. ``by_rpdo`` sends the controlword as a PDO; False: it has to be written too."""
 
     driver: Driver
     target: Target

@@ -56,13 +56,17 @@ async def write_raw(
     *,
     allow: Allow = Allow.NOTHING,
     expected: Raw | None = None,
+    known: int | None = None,
 ) -> WriteResult:
     """Check, write once, read back.
 
     ``expected`` is what the change was made from; where RAM holds another value, nothing is written (ConflictError).
+    ``known``: urgent commands to the object when the write was decided on (``Driver.commanded``), by default those
+    there are now; where another one comes before it leaves, nothing is written (OvertakenError).
     Raises RefusedError (nothing was sent), DeviceError (the device refused), NoAnswerError, or UnverifiedError (sent,
     but another value was read back, or none).
     """
+    known = driver.commanded(target.node, address) if known is None else known
     entry = target.entry(address)
     target.gate.check(target.device)
     await _know_what_it_rests_on(driver, target, entry)
@@ -77,7 +81,7 @@ async def write_raw(
         )
     shown = {"address": address.short, "name": entry.title, "was": _shown(target, entry, was)}
     try:
-        how = await driver.write(target.node, address, data, entry.timeout_s, entry.verify)
+        how = await driver.write(target.node, address, data, entry.timeout_s, entry.verify, known=known)
         read = await _read_back(driver, target, entry, data)
     except HubsideError as error:
         journal.note(Kind.WRITE_FAILED, target.slug, **shown, reason=error.code, now=_shown(target, entry, raw))

@@ -115,7 +115,7 @@ async def test_nothing_is_sent_while_listening(line: Wire) -> None:
     with pytest.raises(RefusedError):
         await driver.read(11, WINDOW)
     with pytest.raises(RefusedError):
-        driver.send_raw(Can(0x60B, bytes(8)))
+        driver.command_raw(11, WINDOW, Can(0x60B, bytes(8)))
     line.send(Can(0x703, b"\x7f"))
     await connecting
     assert sent == []
@@ -134,7 +134,7 @@ async def test_it_listens_in_the_silent_mode_of_an_adapter_that_has_one(tmp_path
         commands = list(adapter.commands)
         assert commands.index(b"L") < commands.index(b"O")
         assert driver.status.state is LinkState.CONNECTED
-        driver.send_raw(Can(0x60B, b"\x40"))
+        driver.command_raw(11, WINDOW, Can(0x60B, b"\x40"))
         await asyncio.to_thread(adapter.wait_for, b"t60B140")
         await driver.close()
 

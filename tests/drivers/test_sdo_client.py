@@ -9,7 +9,7 @@ import pytest
 from app.drivers.contract import Written
 from app.drivers.sdo_client import DEFAULT_TIMEOUT_NS, Job
 from app.drivers.sdo_jobs import read_steps, write_steps
-from app.errors import BusLostError, HubsideError, NoAnswerError, SdoAbortError, UnverifiedError
+from app.errors import BusLostError, HubsideError, NoAnswerError, OvertakenError, SdoAbortError, UnverifiedError
 from app.model.address import Address
 from app.model.description import Verify
 from app.twins.line import Fault, delay, drop, duplicate
@@ -342,6 +342,57 @@ def test_an_urgent_write_waits_for_no_fence() -> None:
     assert rig.port.sent[-1].data == sdo.download_request(WINDOW, u32(6))
     assert len(rig.port.sent) == sent
     rig.run_until(lambda: stop.done)
+
+
+def late_write(rig: Rig, data: bytes) -> Outcome:
+    """A write of WINDOW that knows of no command yet."""
+    outcome = Outcome()
+    counters = rig.client.counters
+    steps = write_steps(11, WINDOW, data, DEFAULT_TIMEOUT_NS, DEFAULT_TIMEOUT_NS, Verify.EQUAL, counters, known=0)
+    rig.client.submit(11, Job(steps, outcome))
+    return outcome
+
+
+def test_what_waits_does_not_follow_an_urgent_command_to_the_same_object() -> None:
+    rig = Rig()
+    device = rig.node()
+    device.watch_writes(WINDOW)
+    read(rig, POSITION)
+    waiting = late_write(rig, u32(5))
+    after = write(rig, TIMEOUT_6066, u16(7))
+    rig.client.commands.note(11, WINDOW)
+    stop = write(rig, WINDOW, u32(6), urgent=True)
+    rig.run_until(lambda: after.done)
+    assert isinstance(waiting.error, OvertakenError)
+    assert (stop.result, after.result) == (Written.ACKNOWLEDGED, Written.ACKNOWLEDGED), "the queue goes on"
+    assert device.written == [(WINDOW, 6)]
+
+
+def test_what_waits_for_a_fence_does_not_follow_it_either() -> None:
+    rig = Rig()
+    device = rig.node()
+    rig.line.inject(Fault(lambda can: can.can_id == 0x60B, drop))
+    write(rig, WINDOW, u32(5))
+    rig.client.abort_current(11)
+    device.watch_writes(WINDOW)
+    waiting = late_write(rig, u32(7))
+    rig.run(MS // 2)
+    assert (rig.client.counters.fences, waiting.done) == (1, False)
+    rig.client.commands.note(11, WINDOW)
+    stop = write(rig, WINDOW, u32(6), urgent=True)
+    rig.run_until(lambda: stop.done and waiting.done)
+    assert isinstance(waiting.error, OvertakenError)
+    assert device.written == [(WINDOW, 6)]
+
+
+def test_a_write_that_nothing_has_overtaken_is_sent() -> None:
+    rig = Rig()
+    device = rig.node()
+    rig.client.commands.note(11, TIMEOUT_6066)
+    rig.client.commands.note(12, WINDOW)
+    written = late_write(rig, u32(5))
+    rig.run_until(lambda: written.done)
+    assert (written.result, raw(device, WINDOW)) == (Written.ACKNOWLEDGED, 5)
 
 
 def test_abort_current_ends_the_running_job_and_starts_the_next() -> None:

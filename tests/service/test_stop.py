@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import asyncio
 
+import pytest
+
+from app.errors import OvertakenError
 from app.model.address import Address
+from app.model.checks import Allow
 from app.service.backup import read_devices
 from app.service.connection import Connection
 from app.service.stop import Command, Path, command_all
-from app.twins.line import Fault, drop
+from app.service.write import write_raw
+from app.twins.line import Fault, delay, drop
 from app.wire.nmt import NmtCommand
 from tests.e2e.test_interoperation import until
-from tests.service.conftest import Served
+from tests.service.conftest import MS, Served
 
 CONTROLWORD = Address(0x6040)
 ANGLE = Address(0x6064)
@@ -82,3 +87,42 @@ async def test_one_dead_axis_does_not_keep_the_others_from_stopping(connection: 
     failed = [outcome.device for outcome in outcomes if outcome.how is Path.FAILED]
     assert failed == ["wtg-07/blade-1/pmc"]
     assert await statusword(connection, 12) & 0x6F != 0x27
+
+
+async def test_a_write_that_waits_does_not_follow_a_stop(connection: Connection, served: Served) -> None:
+    """Whoever asked for it did not know of the STOP: it would set the axis going again."""
+    await enable(connection, 11)
+    target = connection.target("wtg-07/blade-1/pmc")
+    driver = connection.driver(target)
+    served.spoil(Fault(lambda can: can.can_id == 0x58B, drop, times=1))
+    waits_500_ms = asyncio.create_task(driver.read(11, ANGLE))
+    enabling = asyncio.create_task(
+        write_raw(driver, target, CONTROLWORD, 0x010F, connection.journal, allow=Allow.MOTION)
+    )
+    await asyncio.sleep(0)  # both wait in the queue of the node
+    await command_all(connection.axes(), Command.STOP, connection.journal, connection.stamper)
+    with pytest.raises(OvertakenError):
+        await enabling
+    await waits_500_ms
+    assert int.from_bytes(await driver.read(11, CONTROLWORD), "little") == Command.STOP.value
+    assert await statusword(connection, 11) & 0x6F != 0x27
+
+
+async def test_a_stop_by_pdo_is_not_undone_by_a_write_that_is_on_its_way(
+    connection: Connection, served: Served
+) -> None:
+    """A device works what comes by SDO in its own time: the STOP follows the write on the same way then."""
+    driver = connection.buses["can0"].driver
+    driver.nmt(NmtCommand.START, 11)
+    await enable(connection, 11)
+    await until(lambda: (view := connection.live.node("can0", 11)) is not None and view.state is not None)
+    served.spoil(Fault(lambda can: can.can_id == 0x60B, delay(100 * MS), times=None))
+    enabling = asyncio.create_task(driver.write(11, CONTROLWORD, (0x010F).to_bytes(2, "little")))
+    await until(lambda: driver._client.may_still_write(11, CONTROLWORD))
+    outcomes = await command_all(connection.axes(), Command.STOP, connection.journal, connection.stamper)
+    by_device = {outcome.device: outcome for outcome in outcomes}
+    assert by_device["wtg-07/blade-1/pmc"].how is Path.SDO
+    assert by_device["wtg-07/blade-1/pmc"].confirmed_t_ns is not None
+    await asyncio.gather(enabling, return_exceptions=True)
+    assert int.from_bytes(await driver.read(11, CONTROLWORD), "little") == Command.STOP.value
+    assert await statusword(connection, 11) & 0x6F != 0x27

@@ -13,6 +13,7 @@ from math import radians
 from typing import Final
 
 from app.twins.axis_drive import Feedback
+from app.twins.canopen_device import Power
 from app.twins.cia402 import Command, Signals, State
 from app.twins.plant import GEAR_RATIO
 from tests.twins.harness import MS
@@ -185,7 +186,7 @@ class Witness:
         assert not word & 0x8100
         pmc = self.rig.pmc
         assert bool(word & 0x0200) is pmc.inputs.efc
-        if pmc.inputs.efc:
+        if pmc.inputs.efc and pmc.device.power is not Power.OFF:  # what was in RAM is gone with the supply
             assert (word ^ self._number(0x6040)) & 0x4000 == 0
 
     def _check_mode(self) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import Any
+from typing import Any, Final
 
 from app.errors import HubsideError, RestoreBrokenError
 from app.model.restore.wanted import PlanOptions
@@ -126,6 +126,8 @@ class Cause(Enum):
     """RAM holds another value than it was to hold: somebody else writes, or the device lost it."""
     DEVICE_RESTARTED = "device-restarted"
     DRIVE_ENABLED = "drive-enabled"
+    OVERTAKEN = "overtaken"
+    """Somebody sent STOP or FEATHER, and the next step would have undone it."""
     SAVE_FAILED = "save-failed"
     PROOF_FAILED = "proof-failed"
     NOT_CONFIRMED = "not-confirmed"
@@ -149,8 +151,20 @@ class Cause(Enum):
 
     @property
     def allows_rollback(self) -> bool:
-        """True where the devices and the store can be reached, so that the old values can be put back at once."""
-        return self not in (Cause.BUS_LOST, Cause.STORE_FAILED, Cause.TOOL_ENDED, Cause.DEFECT, Cause.OTHER_DEVICE)
+        """True where the old values can be put back at once: devices and store can be reached, nobody wants a halt."""
+        return self not in _HALTING
+
+
+_HALTING: Final = frozenset(
+    {
+        Cause.BUS_LOST,
+        Cause.STORE_FAILED,
+        Cause.TOOL_ENDED,
+        Cause.DEFECT,
+        Cause.OTHER_DEVICE,
+        Cause.OVERTAKEN,
+    }
+)
 
 
 class Broken(Exception):  # noqa: N818 - no error of the tool: how one part of a restore tells another that it ended

@@ -14,6 +14,7 @@ from app.errors import (
     DeviceError,
     HubsideError,
     NoAnswerError,
+    OvertakenError,
     StoreError,
     UnverifiedError,
 )
@@ -56,8 +57,9 @@ LOOK_S: Final = 0.05
 class Hands:
     """Carries out single steps at one station. Every method raises Broken, and nothing else that is expected.
 
-    ``targets`` by slug pass no gate. ``now`` is what RAM is known to hold; the boots and reconnects of ``look_anew``
-    are those against which a hidden restart or a gap shows.
+    ``targets`` by slug pass no gate. ``now`` is what RAM is known to hold; the boots and reconnects of ``take`` are
+    those against which a hidden restart or a gap shows. STOP or FEATHER after ``decided`` ends what would undo it: a
+    write of the controlword, and a restart, which opens the safety chain.
     """
 
     def __init__(
@@ -80,12 +82,17 @@ class Hands:
         self._expert = expert
         self._boots: dict[str, int] = {}
         self._reconnects = self._all_reconnects()
+        self._commands = self._all_commands()
 
     def take(self, found: Survey) -> None:
         """Go on from what was just read."""
         self.now = found.station
         self._boots = dict(found.boots)
         self._reconnects = self._all_reconnects()
+
+    def decided(self) -> None:
+        """A person wants it to go on, knowing what was commanded until now."""
+        self._commands = self._all_commands()
 
     # -- what must hold --------------------------------------------------------------
 
@@ -138,6 +145,18 @@ class Hands:
             if word is not None and word & _FEATHER:
                 self._log.ended(StepState.FAILED)
                 raise Broken(Cause.DRIVE_ENABLED, slug)
+
+    def _not_overtaken(self) -> None:
+        """Nobody has sent STOP or FEATHER. Raises OvertakenError."""
+        for slug, count in self._all_commands().items():
+            if count != self._commands[slug]:
+                target = self.targets[slug]
+                raise OvertakenError(bus=target.device.bus, node=target.node, address=CONTROLWORD.short)
+
+    def _all_commands(self) -> dict[str, int]:
+        """How many urgent commands each device has got."""
+        drivers = ((slug, target, self.connection.driver(target)) for slug, target in self.targets.items())
+        return {slug: driver.commanded(target.node, CONTROLWORD) for slug, target, driver in drivers}
 
     async def _integer(self, target: Target, address: Address) -> int | None:
         try:
@@ -220,9 +239,17 @@ class Hands:
         place = Place(target.slug, CONTROLWORD)
         await self._log.intend(direction, StepKind.AUXILIARY, target.slug, place, SHUTDOWN)
         try:
-            driver = self.connection.driver(target)
             done = await whole(
-                write_raw(driver, target, CONTROLWORD, SHUTDOWN, self._journal, allow=Allow.MOTION, expected=word)
+                write_raw(
+                    self.connection.driver(target),
+                    target,
+                    CONTROLWORD,
+                    SHUTDOWN,
+                    self._journal,
+                    allow=Allow.MOTION,
+                    expected=word,
+                    known=self._commands[target.slug],
+                )
             )
         except HubsideError as error:
             self._log.ended(_state_after(error), error)
@@ -281,7 +308,9 @@ class Hands:
         before = boots_of(target)
         driver, stamper = self.connection.driver(target), self.connection.stamper
         try:
-            took = await whole(restart(driver, target, self._journal, stamper, self.timing.boot_s))
+            took = await whole(
+                restart(driver, target, self._journal, stamper, self.timing.boot_s, sure=self._not_overtaken)
+            )
         except HubsideError as error:
             self._log.ended(_state_after(error), error)
             raise Broken(cause_of(error), slug, error) from error
@@ -313,6 +342,7 @@ def cause_of(error: HubsideError) -> Cause:
         (BusLostError, Cause.BUS_LOST),
         (StoreError, Cause.STORE_FAILED),
         (ConflictError, Cause.CHANGED),
+        (OvertakenError, Cause.OVERTAKEN),
         (NoAnswerError, Cause.NO_ANSWER),
         (UnverifiedError, Cause.UNVERIFIED),
     )

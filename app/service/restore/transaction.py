@@ -108,6 +108,7 @@ class Transaction:
 
     def turn_back(self, person: str) -> None:
         """A person wants the old values: after the step that runs now."""
+        self._hands.decided()
         self._back_by = person
         self._decided.set()
 
@@ -269,6 +270,7 @@ class Transaction:
                 self._hands.look_for_restarts()
                 await asyncio.sleep(LOOK_S)
             self._look_for_people(direction)
+        self._hands.decided()
         self._tell(Kind.RESTORE_CONFIRMED, self._confirmed_by)
         await self._log.enter(
             RestoreState.SAVING, confirmed_by=self._confirmed_by, confirmed_ns=self._hands.connection.stamper()

@@ -18,6 +18,7 @@ from app.service.restore.order import Given, Objection, Order
 from app.service.restore.precheck import is_same_unit
 from app.service.restore.survey import targets_of
 from app.service.stop import Command, command_all
+from app.service.write import write_raw
 from app.twins.faults import Instructor
 from app.twins.object_store import Cell
 from tests.service.restore.conftest import PMC, PMM, STATION, Bench
@@ -143,6 +144,9 @@ async def test_a_station_that_is_not_fit_is_refused(bench: Bench) -> None:
 async def test_a_drive_in_motion_is_refused(bench: Bench) -> None:
     good = await bench.order()
     connection = bench.connection
+    target = connection.target(PMC)
+    slow = parse_address("5681")  # so that it still moves when all is read, however long that takes
+    await write_raw(connection.driver(target), target, slow, 100, connection.journal)
     await command_all(connection.axes(), Command.FEATHER, connection.journal, connection.stamper)
     found = await refused(bench, good)
     assert {(Objection.DRIVE_ENABLED, PMC), (Objection.DRIVE_MOVING, PMC)} <= found

@@ -10,13 +10,14 @@ import pytest
 
 from app.errors import RestoreChangedError, RestoreOpenError, RestoreStateError
 from app.model.address import parse_address
+from app.model.description import Verify
 from app.model.fault import FaultOrder
 from app.service.journal import Entry, Kind
 from app.service.restore.order import Cause
 from app.service.restore.survey import boots_of
 from app.service.restore.transaction import End
 from app.service.save import restart, save
-from app.service.stop import Command, command_all
+from app.service.stop import CONTROLWORD, Command, command_all
 from app.service.write import write_raw
 from app.store.restore_rows import Direction, RestoreState, StepState, peek_open
 from app.twins.faults import Instructor
@@ -29,6 +30,8 @@ from tests.service.restore.conftest import CHANGES, PMC, PMM, QUICK, Bench
 from tests.web.rig import wait_until
 
 ACKNOWLEDGE = 0x60
+HOME_OFFSET = {"607C": 1234}
+"""Taken in homing mode only, and the mode changes only while the controlword asks for nothing."""
 
 
 def new_values() -> dict[tuple[str, str], int]:
@@ -294,6 +297,66 @@ async def test_a_feather_is_not_cut_short_by_a_restart(bench: Bench) -> None:
     kept = await bench.desk.get(restore_id)
     assert kept.outcome["cause"] == Cause.DRIVE_ENABLED.value
     assert [boots_of(target) for target in connection.targets] == boots
+
+
+async def test_a_stop_halts_the_restore_before_it_restarts_anything(bench: Bench) -> None:
+    """A restart opens the safety chain and drives the other blades: not after a STOP, until a person decides."""
+    connection = bench.connection
+    boots = [boots_of(target) for target in connection.targets]
+    sending: list[asyncio.Future[object]] = []
+
+    def stop_after_the_last_save(entry: Entry) -> None:
+        if entry.kind is Kind.SAVED and entry.device == PMC:
+            command = command_all(connection.axes(), Command.STOP, connection.journal, connection.stamper)
+            sending.append(asyncio.ensure_future(command))
+
+    connection.journal.listen(stop_after_the_last_save)
+    restore_id = await bench.begin(restart=True)
+    assert await bench.desk.wait(restore_id) is End.INCOMPLETE
+    assert sending and await sending[0]
+    kept = await bench.desk.get(restore_id)
+    assert kept.outcome["cause"] == Cause.OVERTAKEN.value
+    assert [boots_of(target) for target in connection.targets] == boots
+    sending.clear()
+    await bench.desk.resume(connection, restore_id, "Anna")
+    assert await bench.desk.wait(restore_id) is (End.INCOMPLETE if sending else End.NEW)
+
+
+async def test_a_stop_is_not_overwritten_to_change_the_mode(bench: Bench) -> None:
+    """To change the mode of operation the controlword is written: not where a person has commanded meanwhile."""
+    connection = bench.connection
+    driver = connection.driver(connection.target(PMC))
+    await command_all(
+        connection.axes(), Command.STOP, connection.journal, connection.stamper
+    )  # its bit 3 must go first
+    order = await bench.order({PMC: HOME_OFFSET})
+    prepared = await bench.desk.prepare(connection, order)
+    before = await bench.ram(PMC, "607C")
+    restore_id = await bench.desk.begin(connection, prepared, prepared.hash)
+    await command_all(connection.axes(), Command.STOP, connection.journal, connection.stamper)
+    assert await bench.desk.wait(restore_id) is End.INCOMPLETE
+    assert (await bench.desk.get(restore_id)).outcome["cause"] == Cause.OVERTAKEN.value
+    assert int.from_bytes(await driver.read(11, CONTROLWORD), "little") == Command.STOP.value
+    assert await bench.ram(PMC, "607C") == before
+    await bench.desk.resume(connection, restore_id, "Anna")
+    assert await bench.desk.wait(restore_id) is End.NEW, "a person has decided, knowing of the STOP"
+
+
+async def test_a_rollback_that_nobody_asked_for_does_not_overwrite_a_stop_either(bench: Bench) -> None:
+    connection = bench.connection
+    driver = connection.driver(connection.target(PMC))
+    await driver.write(
+        11, parse_address("6060"), b"\x03", verify=Verify.ACK
+    )  # it goes back there after the homing mode
+    restore_id = await bench.begin({PMC: HOME_OFFSET}, confirm_s=1.0)
+    await bench.until_state(restore_id, RestoreState.AWAITING_CONFIRMATION)
+    await command_all(connection.axes(), Command.STOP, connection.journal, connection.stamper)
+    assert await bench.desk.wait(restore_id) is End.INCOMPLETE
+    outcome = (await bench.desk.get(restore_id)).outcome
+    assert (outcome["first_cause"], outcome["cause"]) == (Cause.NOT_CONFIRMED.value, Cause.OVERTAKEN.value)
+    assert await bench.ram(PMC, "6040") == Command.STOP.value
+    await bench.desk.roll_back(connection, restore_id, "Anna")
+    assert await bench.desk.wait(restore_id) is End.OLD
 
 
 async def test_another_masters_write_is_not_saved(bench: Bench) -> None:
