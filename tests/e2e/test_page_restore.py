@@ -185,6 +185,32 @@ def test_what_nobody_confirms_is_put_back_and_said_so_in_german(page: Page, demo
     assert problems(page) == []
 
 
+def test_an_expert_restores_as_one_only_by_choice_and_what_is_mended_is_told(page: Page, demo: str, sets: str) -> None:
+    """The last one on this demo: once there is a user, the session of the launch is over."""
+    page.goto(tab(demo))
+    api(page, "POST", "/api/live/stop", {})
+    disturb(page, ((PMC, "6510:04", 410),))
+    plan = tab(demo, f"station={TARGET}&sets={sets}")
+    page.goto(plan)
+    expect(page.get_by_test_id("findings-mended")).to_contain_text("6510:04 = 410 V", timeout=RUN_MS)
+    expect(page.get_by_test_id("findings-standing")).to_contain_text("the axis goes on")
+    expect(page.get_by_test_id("findings-new")).to_have_count(0)
+    switch = page.get_by_test_id("restore-expert")
+    expect(switch).to_have_count(0)
+    anna = {"name": "Anna", "password": "pitch and yaw 7"}
+    assert api(page, "POST", "/api/users", anna)["role"] == "expert"
+    assert api(page, "POST", "/api/login", anna)["role"] == "expert"
+    with page.expect_request("**/restore/plan") as asked:
+        page.goto(plan)
+    assert json.loads(asked.value.post_data or "")["expert"] is False
+    expect(switch).not_to_be_checked(timeout=RUN_MS)
+    with page.expect_request("**/restore/plan") as asked:
+        switch.check()
+    assert json.loads(asked.value.post_data or "")["expert"] is True
+    expect(switch).to_be_checked()
+    assert problems(page) == []
+
+
 def problems(page: Page) -> list[str]:
     """Serious findings of axe on the page as it stands."""
     page.add_script_tag(path=str(AXE))

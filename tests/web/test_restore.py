@@ -33,10 +33,10 @@ async def server(connection: Connection, tmp_path: Path) -> AsyncIterator[Server
         await started.bench.restores.close()
 
 
-async def sets_in_library(server: Server) -> list[str]:
-    """Records of the station's sets, changed by ``NEW``."""
+async def sets_in_library(server: Server, wanted: dict[str, dict[str, int]] | None = None) -> list[str]:
+    """Records of the station's sets, changed by ``NEW`` or what is ``wanted``."""
     sets = []
-    for slug, changes in NEW.items():
+    for slug, changes in (NEW if wanted is None else wanted).items():
         target = server.connection.target(slug)
         report = await read_device(server.connection.driver(target), target)
         sets.append(changed(to_set(report, "wtg-07", "Anna", "backup", 0), changes))
@@ -156,6 +156,54 @@ async def test_what_is_refused_is_refused_with_reasons(server: Server) -> None:
     answer = await server.client.post("/api/live/restore", json={**request, "plan_hash": "0" * 64})
     assert (answer.status_code, answer.json()["code"]) == (409, "restore_changed")
     assert (await server.client.get("/api/live/restores")).json() == []
+
+
+async def plan_of(server: Server, changes: dict[str, dict[str, int]], **options: Any) -> dict[str, Any]:
+    """The plan for the station's values with ``changes``."""
+    request = {"station": STATION, "sets": await sets_in_library(server, changes), **options}
+    return await post(server, "/api/live/restore/plan", request)
+
+
+async def test_to_restore_as_an_expert_is_a_choice_that_needs_the_role(server: Server) -> None:
+    """A factory value is taken only where it is asked for; the role alone does not ask, and asking is no role."""
+    changes = {PMM: {"30F1:01": 513}}
+    sets = await sets_in_library(server, changes)
+    for path, more in (("/api/live/restore/plan", {}), ("/api/live/restore", {"plan_hash": "0" * 64})):
+        body = {"station": STATION, "sets": sets, "expert": True, **more}
+        refused = await server.client.post(path, json=body)
+        assert (refused.status_code, refused.json()["code"]) == (403, "role"), path
+    anna = {"name": "Anna", "password": "pitch and yaw 7"}
+    assert (await server.client.post("/api/users", json=anna)).json()["role"] == "expert"
+    assert (await server.client.post("/api/login", json=anna)).is_success
+    plain = await plan_of(server, changes)
+    chosen = await plan_of(server, changes, expert=True)
+    treated = [
+        next((row["treatment"], row["why"]) for row in plan["rows"] if row["address"] == "30F1:01")
+        for plan in (plain, chosen)
+    ]
+    assert treated == [("skip", "needs-expert"), ("write", None)]
+    assert plain["hash"] != chosen["hash"]
+    for term in ({"other_blades_confirmed": True}, {"accepted": ["oat.dc_link_ladder"]}):
+        body = {"station": STATION, "sets": sets, **term}
+        refused = await server.client.post("/api/live/restore/plan", json=body)
+        assert (refused.status_code, refused.json()["code"]) == (400, "usage"), term
+
+
+async def test_a_plan_tells_what_it_breaks_from_what_is_broken_and_what_it_mends(server: Server) -> None:
+    ladder, battery, loss = "oat.dc_link_ladder", "oat.pmc_minimum_below_battery", "oat.connection_loss"
+
+    def told(plan: dict[str, Any]) -> dict[str, bool]:
+        return {one["rule"]: one["is_new"] for one in plan["findings"] if one["verdict"] == "broken"}
+
+    whole = await sets_in_library(server, {PMC: {}})
+    torn = await plan_of(server, {PMC: {"6510:04": 410}})
+    assert (told(torn)[ladder], told(torn)[loss], torn["mended"]) == (True, False, [])
+    assert [(one["rule"], one["is_new"]) for one in torn["blockers"]] == [(ladder, True), (battery, True)]
+    written = {"address": "6510:04", "raw": 410}
+    assert (await server.client.post(f"/api/live/devices/{PMC}/write", json=written)).is_success
+    plan = await post(server, "/api/live/restore/plan", {"station": STATION, "sets": whole})
+    assert ladder not in told(plan)
+    assert [one["rule"] for one in plan["mended"]] == [ladder, battery]
 
 
 WRONG: list[tuple[str, dict[str, Any], int, str]] = [

@@ -20,7 +20,7 @@ from app.model.restore.rows import rows_of
 from app.model.restore.walk import MODE
 from app.model.restore.wanted import DeviceState, PlanOptions, Values
 from app.model.rules.all_rules import ALL
-from app.model.rules.check import check_station
+from app.model.rules.check import broken_in, check_station
 from app.model.rules.rule import Finding, Rule, Severity, Verdict
 from app.model.station import Place, StationValues, station_slug
 
@@ -124,7 +124,7 @@ def _blockers(findings: Iterable[Finding], before: Iterable[Finding], options: P
     """
     if options.returning:
         return ()
-    broken = {(one.rule_id, one.places) for one in before if one.verdict is Verdict.BROKEN}
+    broken = broken_in(before)
     accepted = options.accepted if options.expert else frozenset()
     return tuple(
         one

@@ -39,9 +39,10 @@ class RestorePlanRequest(BaseModel):
     """Which sets (ids of records, or at least 8 digits of a hash) ``station`` is to have; one a device.
 
     A set of the same device goes to it, any other to the device of its kind; ``motor:ID@VERSION:DEVICE`` stands for the
-    set of what a motor puts into its drive. ``selected`` null takes everything that
-    may be taken. ``restart``: a restart of the devices is agreed to. ``accepted``: rules that an expert lets stay
-    broken where they are broken already.
+    set of what a motor puts into its drive. ``selected`` null takes everything that may be taken. ``restart``: a
+    restart of the devices is agreed to. ``expert``: what only the maker sets is restored too; that needs the role, and
+    ``other_blades_confirmed`` (the expert answers for blades that are not in feather) and ``accepted`` (rules that may
+    stay broken where they are broken already) are refused without it.
     """
 
     model_config = ConfigDict(extra="forbid")
@@ -50,6 +51,7 @@ class RestorePlanRequest(BaseModel):
     sets: Annotated[list[Annotated[str, Field(max_length=300)]], Field(min_length=1, max_length=20)]
     selected: Annotated[list[RestorePlace], Field(max_length=5_000)] | None = None
     restart: bool = False
+    expert: bool = False
     other_blades_confirmed: bool = False
     accepted: Annotated[list[Annotated[str, Field(max_length=100)]], Field(max_length=100)] = []
 
@@ -105,11 +107,15 @@ class RestorePlanStep(BaseModel):
 
 
 class RestoreFinding(BaseModel):
-    """What a rule says of the station as it will be. The text is ``rule.<rule>.broken`` or ``rule.not_checked``."""
+    """What a rule says of the station. The text is ``rule.<rule>.broken`` or ``rule.not_checked``.
+
+    ``is_new``: it is not broken in the station as it is now; only of what is broken.
+    """
 
     rule: str
     severity: Literal["error", "warning", "note"]
     verdict: Literal["broken", "not-checked"]
+    is_new: bool
     places: list[RestorePlace]
     details: dict[str, Any]
 
@@ -127,7 +133,11 @@ class RestoreSource(BaseModel):
 
 
 class RestorePlanDoc(BaseModel):
-    """A plan. It can be begun where nothing is refused; ``hash`` names all that a person agrees to."""
+    """A plan. It can be begun where nothing is refused; ``hash`` names all that a person agrees to.
+
+    ``findings``: what the rules say of the station as it will be; ``blockers``: those of them that forbid it;
+    ``mended``: what is broken now and will not be any more.
+    """
 
     station: str
     hash: str
@@ -139,6 +149,7 @@ class RestorePlanDoc(BaseModel):
     restarts: list[str]
     findings: list[RestoreFinding]
     blockers: list[RestoreFinding]
+    mended: list[RestoreFinding]
     unordered: list[RestorePlace]
 
 

@@ -11,6 +11,7 @@ from app.model.datatypes import Raw
 from app.model.description import Description
 from app.model.description_file import BUILTIN, load_builtin
 from app.model.restore.plan import PlanRow, Step, StepKind
+from app.model.rules.check import BrokenAt, broken_in, check_station, mended
 from app.model.rules.rule import Finding
 from app.model.station import Place, StationValues
 from app.model.values import quantity_of, show
@@ -54,6 +55,8 @@ _ENDS: Final[Mapping[RestoreState, EndName]] = {
 def plan_doc(prepared: Prepared) -> RestorePlanDoc:
     """A plan with what speaks against it."""
     plan, station = prepared.plan, prepared.found.station
+    before = check_station(station)
+    broken = broken_in(before)
     return RestorePlanDoc(
         station=prepared.order.station,
         hash=prepared.hash,
@@ -68,8 +71,9 @@ def plan_doc(prepared: Prepared) -> RestorePlanDoc:
         steps=[_step(step, station) for step in plan.steps],
         needs={slug: [need.value for need in needs] for slug, needs in plan.needs.items()},
         restarts=list(plan.restarts),
-        findings=[_finding(one) for one in plan.findings],
-        blockers=[_finding(one) for one in plan.blockers],
+        findings=[_finding(one, broken) for one in plan.findings],
+        blockers=[_finding(one, broken) for one in plan.blockers],
+        mended=[_finding(one, broken) for one in mended(before, plan.findings)],
         unordered=[_place(one) for one in plan.unordered],
     )
 
@@ -130,11 +134,12 @@ def _step(step: Step, station: StationValues) -> RestorePlanStep:
     )
 
 
-def _finding(finding: Finding) -> RestoreFinding:
+def _finding(finding: Finding, before: frozenset[BrokenAt]) -> RestoreFinding:
     return RestoreFinding(
         rule=finding.rule_id,
         severity=finding.severity.value,
         verdict=finding.verdict.value,
+        is_new=bool(broken_in([finding]) - before),
         places=[_place(place) for place in finding.places],
         details=dict(finding.details),
     )

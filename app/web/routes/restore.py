@@ -7,6 +7,7 @@ from typing import Annotated, Final, Literal
 
 from fastapi import APIRouter, Query, Response
 
+from app.errors import RoleError, UsageError
 from app.model.address import parse_address
 from app.model.roles import Role, SignedIn
 from app.model.station import Place
@@ -104,7 +105,11 @@ async def record_file(
 
 
 async def _order(bench: Bench, connection: Connection, person: SignedIn, request: RestorePlanRequest) -> Order:
-    """What the page asks for. Raises UsageError, SetUnknownError, MotorUnknownError, MotorInventedError."""
+    """What the page asks for.
+
+    Raises RoleError, UsageError, SetUnknownError, MotorUnknownError, MotorInventedError.
+    """
+    _check_expert(person, request)
     library, motors = bench.office.library, bench.office.motors
     records = [await library.record(key) for key in request.sets if not is_motor(key)]
     sets = [Given(await library.set_of(record), record.id) for record in records]
@@ -118,7 +123,7 @@ async def _order(bench: Bench, connection: Connection, person: SignedIn, request
         person=person.person,
         selected=None if chosen is None else frozenset(Place(one.device, parse_address(one.address)) for one in chosen),
         restart=request.restart,
-        expert=person.role.covers(Role.EXPERT),
+        expert=request.expert,
         reason="" if full is None else full.reason,
         work_order="" if full is None else full.work_order,
         confirm_s=None if full is None else full.confirm_s,
@@ -126,6 +131,14 @@ async def _order(bench: Bench, connection: Connection, person: SignedIn, request
         accepted=frozenset(request.accepted),
         homeless=homeless,
     )
+
+
+def _check_expert(person: SignedIn, request: RestorePlanRequest) -> None:
+    """What only an expert may do he does knowingly. Raises RoleError, UsageError."""
+    if request.expert and not person.role.covers(Role.EXPERT):
+        raise RoleError(needs=Role.EXPERT.value, has=person.role.value)
+    if (request.other_blades_confirmed or request.accepted) and not request.expert:
+        raise UsageError(reason="other_blades_confirmed and accepted are for experts: set expert")
 
 
 async def _doc(bench: Bench, restore_id: str) -> RestoreDoc:

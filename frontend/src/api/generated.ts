@@ -4294,13 +4294,17 @@ export interface components {
         };
         /**
          * RestoreFinding
-         * @description What a rule says of the station as it will be. The text is ``rule.<rule>.broken`` or ``rule.not_checked``.
+         * @description What a rule says of the station. The text is ``rule.<rule>.broken`` or ``rule.not_checked``.
+         *
+         *     ``is_new``: it is not broken in the station as it is now; only of what is broken.
          */
         RestoreFinding: {
             /** Details */
             details: {
                 [key: string]: unknown;
             };
+            /** Is New */
+            is_new: boolean;
             /** Places */
             places: components["schemas"]["RestorePlace"][];
             /** Rule */
@@ -4360,6 +4364,9 @@ export interface components {
         /**
          * RestorePlanDoc
          * @description A plan. It can be begun where nothing is refused; ``hash`` names all that a person agrees to.
+         *
+         *     ``findings``: what the rules say of the station as it will be; ``blockers``: those of them that forbid it;
+         *     ``mended``: what is broken now and will not be any more.
          */
         RestorePlanDoc: {
             /** Blockers */
@@ -4368,6 +4375,8 @@ export interface components {
             findings: components["schemas"]["RestoreFinding"][];
             /** Hash */
             hash: string;
+            /** Mended */
+            mended: components["schemas"]["RestoreFinding"][];
             /** Needs */
             needs: {
                 [key: string]: ("axis-disabled" | "homing-mode")[];
@@ -4392,9 +4401,10 @@ export interface components {
          * @description Which sets (ids of records, or at least 8 digits of a hash) ``station`` is to have; one a device.
          *
          *     A set of the same device goes to it, any other to the device of its kind; ``motor:ID@VERSION:DEVICE`` stands for the
-         *     set of what a motor puts into its drive. ``selected`` null takes everything that
-         *     may be taken. ``restart``: a restart of the devices is agreed to. ``accepted``: rules that an expert lets stay
-         *     broken where they are broken already.
+         *     set of what a motor puts into its drive. ``selected`` null takes everything that may be taken. ``restart``: a
+         *     restart of the devices is agreed to. ``expert``: what only the maker sets is restored too; that needs the role, and
+         *     ``other_blades_confirmed`` (the expert answers for blades that are not in feather) and ``accepted`` (rules that may
+         *     stay broken where they are broken already) are refused without it.
          */
         RestorePlanRequest: {
             /**
@@ -4402,6 +4412,11 @@ export interface components {
              * @default []
              */
             accepted: string[];
+            /**
+             * Expert
+             * @default false
+             */
+            expert: boolean;
             /**
              * Other Blades Confirmed
              * @default false
@@ -4510,6 +4525,11 @@ export interface components {
              * @default 300
              */
             confirm_s: number;
+            /**
+             * Expert
+             * @default false
+             */
+            expert: boolean;
             /**
              * Other Blades Confirmed
              * @default false

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from app.model.rules.check import broken_stepwise, check_station
+from app.model.rules.check import broken_in, broken_stepwise, check_station, mended
 from app.model.rules.dc_link import RULES as DC_LINK
 from app.model.rules.look import PMC, PMM
 from app.model.rules.rule import Severity, Verdict
@@ -72,3 +72,14 @@ def test_two_devices_of_a_kind_are_both_judged_where_no_partner_is_asked() -> No
     two = StationValues((device(PMC, {"60FB:01": 0}), device(PMC, {"60FB:01": 0}, "wtg-07/blade-2/pmc-b")))
     slugs = [one.places[0].slug for one in check_station(two) if one.rule_id == "oat.position_gain"]
     assert slugs == ["wtg-07/blade-2/pmc", "wtg-07/blade-2/pmc-b"]
+
+
+def test_what_a_change_breaks_mends_and_leaves_broken_is_told_apart() -> None:
+    torn = check_station(station(pmc={"6510:04": 400}), RULES)
+    other = check_station(station(pmc={"6510:05": 749}), RULES)
+    assert broken_in(torn) - broken_in(other) == broken_in(torn)
+    assert broken_in(torn) - broken_in(torn) == frozenset()
+    assert mended(torn, other) == torn
+    assert mended(torn, torn) == []
+    alone = check_station(StationValues((device(PMM, {}),)), RULES)
+    assert alone and mended(torn, alone) == [], "what cannot be judged any more is not mended"

@@ -16,11 +16,12 @@ export function RestoreTab() {
   const station = useStation();
   const connected = useQuery(turbineQuery).data !== undefined;
   if (search.restore !== undefined) return <RestoreRun key={search.restore} id={search.restore} />;
+  // What an expert answers for at one station he does not answer for at another.
   const chosen = station !== undefined && setsIn(search.sets).length > 0;
   return (
     <div className={classes.room}>
       {connected ? <Setup /> : <p className={classes.note}>{t("page.restoring.connect_first")}</p>}
-      {connected && chosen ? <PlanView /> : <History />}
+      {connected && chosen ? <PlanView key={station.slug} /> : <History />}
     </div>
   );
 }

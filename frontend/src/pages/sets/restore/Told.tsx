@@ -1,19 +1,13 @@
-import { Checkbox } from "@mantine/core";
-import {
-  IconAlertTriangle,
-  IconCircleCheck,
-  IconListCheck,
-  IconRefresh,
-  IconShieldX,
-  IconTool,
-} from "@tabler/icons-react";
-import type { PlanDoc, PlanFinding, PlanSource, Refusal } from "../../../api/restore";
+import { Checkbox, Switch } from "@mantine/core";
+import { IconCircleCheck, IconListCheck, IconRefresh, IconShieldX, IconTool } from "@tabler/icons-react";
+import type { PlanDoc, PlanSource, Refusal } from "../../../api/restore";
 import { useRole } from "../../../frame/role";
 import { type Translate, useTexts } from "../../../texts/texts";
 import { useDeviceName } from "../../../ui/devices";
 import { dateAndTime } from "../../../ui/format";
 import { GivenName, isMotor } from "../motors/GivenName";
-import type { Terms } from "./order";
+import { Findings } from "./Findings";
+import { NO_TERMS, type Terms } from "./order";
 import classes from "./Restore.module.css";
 
 interface Props {
@@ -35,6 +29,7 @@ export function Told(props: Props) {
       aria-label={t("page.restoring.told")}
       data-testid="restore-told"
     >
+      <AsExpert {...props} />
       <Refusals {...props} />
       <WhatHappens {...props} />
       <Needs plan={props.plan} />
@@ -45,9 +40,29 @@ export function Told(props: Props) {
 
 const OTHER_BLADES = "other-blades";
 
-function Refusals({ plan, terms, onTerms }: Props) {
+/** What only an expert may do is done knowingly: off until switched on, and nothing of it stays once it is off. */
+function AsExpert({ terms, onTerms }: Props) {
   const t = useTexts();
   const { may } = useRole();
+  if (!may("expert")) return null;
+  return (
+    <section>
+      <Switch
+        label={t("page.restoring.expert.switch")}
+        description={t("page.restoring.expert.permits")}
+        checked={terms.expert}
+        onChange={(event) => {
+          const expert = event.currentTarget.checked;
+          onTerms(expert ? { ...terms, expert } : { ...NO_TERMS, restart: terms.restart });
+        }}
+        data-testid="restore-expert"
+      />
+    </section>
+  );
+}
+
+function Refusals({ plan, terms, onTerms }: Props) {
+  const t = useTexts();
   if (plan.refusals.length === 0)
     return (
       <section>
@@ -69,7 +84,7 @@ function Refusals({ plan, terms, onTerms }: Props) {
           <RefusalLine key={`${one.code} ${one.device}`} refusal={one} />
         ))}
       </ul>
-      {others && may("expert") && (
+      {others && terms.expert && (
         <Checkbox
           mt="sm"
           label={t("page.restoring.others_confirmed")}
@@ -194,78 +209,6 @@ function Needs({ plan }: { plan: PlanDoc }) {
         </p>
       ))}
     </section>
-  );
-}
-
-/** What the rules say of the station as it will be: broken ones first, then those that could not be judged. */
-function Findings({ plan, terms, onTerms }: Props) {
-  const t = useTexts();
-  const broken = plan.findings.filter((one) => one.verdict === "broken");
-  const unjudged = plan.findings.filter((one) => one.verdict === "not-checked");
-  return (
-    <section data-testid="restore-findings">
-      <h2 className={broken.length > 0 ? "tone-warning" : ""}>
-        {broken.length > 0 ? (
-          <IconAlertTriangle size={20} aria-hidden />
-        ) : (
-          <IconCircleCheck size={20} aria-hidden />
-        )}
-        {t(`page.restoring.rules.${broken.length > 0 ? "broken" : "kept"}`, { count: broken.length })}
-      </h2>
-      <ul>
-        {broken.map((one, at) => (
-          <FindingLine key={`${one.rule} ${at}`} finding={one} plan={plan} terms={terms} onTerms={onTerms} />
-        ))}
-      </ul>
-      {unjudged.length > 0 && (
-        <details>
-          <summary>{t("page.restoring.rules.not_checked", { count: unjudged.length })}</summary>
-          <ul>
-            {unjudged.map((one) => (
-              <li key={one.rule}>
-                {t(`rule.${one.rule}.title`)}
-                <small>{t("rule.not_checked", one.details)}</small>
-              </li>
-            ))}
-          </ul>
-        </details>
-      )}
-    </section>
-  );
-}
-
-interface FindingProps {
-  finding: PlanFinding;
-  plan: PlanDoc;
-  terms: Terms;
-  onTerms: (terms: Terms) => void;
-}
-
-/** An expert may accept an error that stands in the station already; a new one the server lets nobody accept. */
-function FindingLine({ finding, plan, terms, onTerms }: FindingProps) {
-  const t = useTexts();
-  const { may } = useRole();
-  const { rule, severity } = finding;
-  const accepted = terms.accepted.includes(rule);
-  const blocks = plan.blockers.some((one) => one.rule === rule);
-  const others = terms.accepted.filter((one) => one !== rule);
-  return (
-    <li data-testid={`finding-${rule}`}>
-      <span className={severity === "error" ? "tone-error" : severity === "warning" ? "tone-warning" : "dim"}>
-        {t(`page.restoring.severity.${severity}`)}
-      </span>{" "}
-      {t(`rule.${rule}.broken`, finding.details)}
-      <small>{t(`rule.${rule}.why`)}</small>
-      {blocks && accepted && <small className="tone-error">{t("page.restoring.rules.new")}</small>}
-      {may("expert") && (blocks || accepted) && (
-        <Checkbox
-          label={t("page.restoring.rules.accept")}
-          checked={accepted}
-          onChange={() => onTerms({ ...terms, accepted: accepted ? others : [...others, rule] })}
-          data-testid={`accept-${rule}`}
-        />
-      )}
-    </li>
   );
 }
 

@@ -14,11 +14,13 @@ import { linesOf, type PlanLine, selectedIn } from "./plan";
 /** What a person ticks besides the objects. */
 export interface Terms {
   restart: boolean;
+  /** Restored as an expert: with what only the maker sets, and the two below. */
+  expert: boolean;
   othersConfirmed: boolean;
   accepted: readonly string[];
 }
 
-export const NO_TERMS: Terms = { restart: true, othersConfirmed: false, accepted: [] };
+export const NO_TERMS: Terms = { restart: true, expert: false, othersConfirmed: false, accepted: [] };
 
 export const setsIn = (text: string | undefined): string[] => (text ?? "").split(",").filter(Boolean);
 
@@ -44,6 +46,7 @@ export function useOrder(terms: Terms): PlanRequest | null {
       sets,
       selected: selectedIn(search.select, devices),
       restart: terms.restart,
+      expert: terms.expert,
       other_blades_confirmed: terms.othersConfirmed,
       accepted: [...terms.accepted],
     };

@@ -51,6 +51,7 @@ const plan = (rows: PlanRow[], more: Partial<PlanDoc> = {}): PlanDoc => ({
   restarts: [],
   findings: [],
   blockers: [],
+  mended: [],
   unordered: [],
   ...more,
 });
@@ -87,6 +88,7 @@ describe("what becomes of each object", () => {
       rule: "r",
       severity: "error",
       verdict: "broken",
+      is_new: true,
       places: [place],
       details: {},
     };
