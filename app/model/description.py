@@ -194,7 +194,8 @@ class Entry:
 
     ``default``, ``minimum``, ``maximum`` and ``also`` (values allowed beyond the limits) are raw values. Where
     ``node_id``, the node's number is added to the default ($NODEID of CiA 306). ``inferred`` marks what the manual does
-    not print; ``motion`` an object whose write can set an axis in motion. ``line`` is the row's line in its file.
+    not print; ``motion`` an object whose write can set an axis in motion; ``counts`` one that the device itself counts
+    on, so that no old value is put back. ``line`` is the row's line in its file.
     """
 
     address: Address
@@ -227,6 +228,7 @@ class Entry:
     hexadecimal: bool = False
     node_id: bool = False
     motion: bool = False
+    counts: bool = False
     line: int = 0
 
     @property

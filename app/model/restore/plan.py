@@ -26,6 +26,8 @@ class Why(Enum):
     NOT_IN_SET = "not-in-set"
     NOT_ON_DEVICE = "not-on-device"
     NEVER = "never"
+    COUNTS = "counts"
+    """The device counts on by itself: an old value would be false, and could not be proven."""
     OTHER_UNIT = "other-unit"
     """Bound to a machine, and it is not proven that this is the same one."""
     NEEDS_EXPERT = "needs-expert"

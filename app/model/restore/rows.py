@@ -44,6 +44,8 @@ def _row(device: DeviceValues, address: Address, wanted: Values, options: PlanOp
         return PlanRow(place, Treatment.SKIP, now, None, Why.NOT_IN_SET, {"unread": reason} if reason else {})
     if entry.restore is RestoreClass.NEVER:
         return PlanRow(place, Treatment.SKIP, now, target, Why.NEVER)
+    if entry.counts:
+        return PlanRow(place, Treatment.SKIP, now, target, Why.COUNTS)
     if now == target:
         return PlanRow(place, Treatment.EQUAL, now, target)
     why, details = _refusal(device, entry, target, options)

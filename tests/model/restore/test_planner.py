@@ -78,7 +78,7 @@ def test_every_object_of_set_and_device_has_one_row_that_says_what_becomes_of_it
         {"6066": 11, "6073": 2500},
         now=now,
     )
-    reasons = {place(PMM, "3110:01"): Why.NOT_IN_SET, place(PMM, "3050"): Why.OTHER_UNIT}
+    reasons = {place(PMM, "3110:01"): Why.NOT_IN_SET, place(PMM, "3050"): Why.COUNTS}
     reasons |= {place(PMM, "30F0:01"): Why.NEEDS_EXPERT, place(PMM, "3000"): Why.READ_ONLY}
     reasons |= {place(PMM, "3040"): Why.NEVER, place(PMC, "6066"): Why.UNREADABLE, place(PMC, "6073"): Why.MISFIT}
     for where, why in reasons.items():

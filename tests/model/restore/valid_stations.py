@@ -28,7 +28,7 @@ _AXIS: Final = 1
 
 def restorable(description: Description) -> list[Entry]:
     """What a restore may write, be it for experts or to the same machine only."""
-    return [entry for entry in description if entry.restore is not RestoreClass.NEVER]
+    return [entry for entry in description if entry.restore is not RestoreClass.NEVER and not entry.counts]
 
 
 def valid_station(rng: random.Random) -> StationValues:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import count
 
 import pytest
 
@@ -67,6 +68,19 @@ async def test_a_restore_writes_saves_and_proves_the_station(bench: Bench) -> No
     assert bench.desk.open == ()
     assert {step.state for step in kept.steps} == {StepState.DONE}
     assert [step.kind for step in kept.steps] == ["write"] * 5 + ["save"] * 2 + ["restart"] * 2 + ["prove"] * 2
+
+
+async def test_what_the_device_counts_meanwhile_does_not_disturb(bench: Bench) -> None:
+    """The charge counter goes on while the battery is charged: its old value is neither put back nor expected."""
+    cell = bench.served.turbine.blades[0].pmm.device.store.cell(0x3050)
+    counted = count(100)
+    cell.source = lambda: next(counted)
+    restore_id, end = await bench.run()
+    assert end is End.NEW
+    assert (PMM, parse_address("3050")) not in {
+        (place.slug, place.address) for place in (await bench.desk.get(restore_id)).goals
+    }
+    assert await ram(bench) == new_values()
 
 
 async def test_without_a_restart_it_is_saved_and_not_yet_proven(bench: Bench) -> None:
