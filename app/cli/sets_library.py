@@ -163,6 +163,7 @@ async def _import(arguments: argparse.Namespace, output: Output, library: Librar
             output.say("cli.sets.unknown", **details, reason_key=unknown.text_key)
         text = output.texts("cli.sets.taken", device=record.origin.device, values=record.values, id=record.id)
         output.result(_as_dict(record, []), text)
+        tell_ahead(output, library, record)
     return 0
 
 
@@ -228,6 +229,12 @@ async def _nameplate(arguments: argparse.Namespace, output: Output, library: Lib
         output.texts("cli.sets.nameplate", device=arguments.device, serial=serial or "–"),
     )
     return 0
+
+
+def tell_ahead(output: Output, library: Library, record: SetRecord) -> None:
+    """A set whose time cannot be is kept, and this is said."""
+    if library.is_ahead(record):
+        output.say("cli.sets.ahead", device=record.origin.device, time=record.origin.time)
 
 
 def _known() -> dict[str, Description]:

@@ -1,14 +1,17 @@
 """Parameter sets as CSV: a table that spreadsheets open, and in again.
 
 One row an object: address, name, raw value, value and unit as people read them. Only address and raw value are read
-back; raw texts begin with ``text:``, raw bytes with ``hex:``, all else is a number. The head (see ``set_head``) stands
-in rows that begin with ``#``. Separators are commas; semicolons and tabs are read too.
+back; raw texts begin with ``text:``, or with ``json:`` where a character in them is not printable, raw bytes with
+``hex:``, all else is a number. The head (see ``set_head``) stands in rows that begin with ``#``, with values that no
+cell can hold. Separators are commas; semicolons and tabs are read too.
 """
 
 from __future__ import annotations
 
 import csv
 import io
+import json
+import math
 import re
 from collections.abc import Iterator
 from typing import Final
@@ -18,12 +21,15 @@ from app.model.address import Address, parse_address
 from app.model.datatypes import Raw
 from app.model.description import Description
 from app.model.set_head import Imported, Taking, Value, head_of, with_head, without_head
-from app.model.sets import ParameterSet
+from app.model.sets import INTEGERS, ParameterSet
 from app.model.values import quantity_of, show
 
 COLUMNS: Final = ("address", "name", "raw", "value", "unit")
 _HEAD: Final = "#hubside-set"
 _CHUNK: Final = 1000
+_LONGEST: Final = 100_000
+"""Characters of a raw value in a cell: readers of CSV, Python's too, take a longer one for damage."""
+_TEXT, _JSON, _HEX = "text:", "json:", "hex:"
 _INTEGER: Final = re.compile(r"-?[0-9]{1,30}|-?0[xX][0-9A-Fa-f]{1,16}", re.ASCII)
 _FLOAT: Final = re.compile(
     r"-?[0-9]{1,30}\.[0-9]{1,30}([eE][-+]?[0-9]{1,3})?|-?[0-9]{1,30}[eE][-+]?[0-9]{1,3}", re.ASCII
@@ -35,12 +41,14 @@ def dump_csv(parameters: ParameterSet, description: Description | None) -> str:
     """The set as CSV; without ``description`` there are no names and units."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\r\n")
-    head = head_of(parameters, {})
+    others = {address: raw for address, raw in parameters.values.items() if len(_raw_text(raw)) > _LONGEST}
+    head = head_of(parameters, others)
     for start in range(0, len(head), _CHUNK):
         writer.writerow((_HEAD, head[start : start + _CHUNK]))
     writer.writerow(COLUMNS)
     for address in sorted(parameters.values, key=lambda one: one[:2]):
-        writer.writerow(_row(parameters, address, description))
+        if address not in others:
+            writer.writerow(_row(parameters, address, description))
     return out.getvalue()
 
 
@@ -69,10 +77,10 @@ def load_csv(text: str, file: str, taking: Taking) -> Imported:
             if address in values:
                 raise SetFileError(file=file, line=line, reason=f"{address} stands there twice")
             values[address] = value
-    if not values:
-        raise SetFileError(file=file, line=1, reason="it holds no values")
     if head and not taking.as_values:
         return Imported(with_head("".join(head), values, file, head_line))
+    if not values:
+        raise SetFileError(file=file, line=1, reason="it holds no values")
     return without_head(values, taking, file, None)
 
 
@@ -86,13 +94,20 @@ def _row(parameters: ParameterSet, address: Address, description: Description | 
     fits = entry.type.is_integer == isinstance(raw, int)
     shown = show(entry, raw, lookup) if fits or not number else str(raw)
     unit = quantity_of(entry, lookup).unit if number and entry.bits is None else ""
-    return str(address), _harmless(entry.title), _raw_text(raw), shown if number else _harmless(shown), unit
+    return str(address), _harmless(entry.title), _raw_text(raw), shown if number else _harmless(_visible(shown)), unit
 
 
 def _raw_text(raw: Raw) -> str:
     if isinstance(raw, bytes):
-        return f"hex:{raw.hex()}"
-    return f"text:{raw}" if isinstance(raw, str) else repr(raw)
+        return f"{_HEX}{raw.hex()}"
+    if isinstance(raw, str):
+        return f"{_TEXT}{raw}" if raw.isprintable() else f"{_JSON}{json.dumps(raw)}"
+    return repr(raw)
+
+
+def _visible(text: str) -> str:
+    """What is not printable, by its code: a zero byte, say, would make the file none."""
+    return text if text.isprintable() else json.dumps(text)[1:-1]
 
 
 def _harmless(text: str) -> str:
@@ -101,15 +116,17 @@ def _harmless(text: str) -> str:
 
 
 def _rows(text: str, file: str) -> Iterator[tuple[int, list[str]]]:
-    """Rows with something in them, each with the line in which it ends."""
+    """Rows with something in them, each with the line in which it begins."""
     if "\0" in text:
         line = text.count("\n", 0, text.index("\0")) + 1
         raise SetFileError(file=file, line=line, reason="a zero byte: this is no text")
     reader = csv.reader(io.StringIO(text, newline=""), delimiter=_delimiter(text), strict=True)
     try:
+        line = 1
         for row in reader:
             if any(cell.strip() for cell in row):
-                yield reader.line_num, [cell if cell.startswith("text:") else cell.strip() for cell in row]
+                yield line, [cell if cell.startswith(_TEXT) else cell.strip() for cell in row]
+            line = reader.line_num + 1
     except csv.Error as error:
         raise SetFileError(file=file, line=reader.line_num or 1, reason=f"no valid CSV: {error}") from error
 
@@ -145,12 +162,25 @@ def _value(row: dict[str, str], file: str, line: int) -> tuple[Address, Value]:
 
 
 def _raw(text: str) -> Raw:
-    if text.startswith("text:"):
-        return text.removeprefix("text:")
-    if text.startswith("hex:"):
-        return bytes.fromhex(text.removeprefix("hex:"))
+    """The value of a cell. Raises ValueError where it is none, or one that no type holds."""
+    if text.startswith(_TEXT):
+        return text.removeprefix(_TEXT)
+    if text.startswith(_JSON):
+        return _json_text(text.removeprefix(_JSON))
+    if text.startswith(_HEX):
+        return bytes.fromhex(text.removeprefix(_HEX))
     if _INTEGER.fullmatch(text):
-        return int(text, 0 if "x" in text.lower() else 10)
-    if _FLOAT.fullmatch(text):
+        number = int(text, 0 if "x" in text.lower() else 10)
+        if number in INTEGERS:
+            return number
+    elif _FLOAT.fullmatch(text) and math.isfinite(float(text)):
         return float(text)
     raise ValueError(text)
+
+
+def _json_text(text: str) -> str:
+    found = json.loads(text)
+    if not isinstance(found, str):
+        raise ValueError(text)
+    found.encode()  # half a character is none: UnicodeEncodeError is a ValueError
+    return found

@@ -55,14 +55,14 @@ def dump_dcf(parameters: ParameterSet, description: Description, file_name: str 
     origin = parameters.origin
     configured = Configured(
         node=origin.node,
-        name=origin.device,
-        network=origin.turbine,
+        name=_one_line(origin.device),
+        network=_one_line(origin.turbine),
         serial=parameters.identity.serial or 0,
         values=texts,
         comments=tuple(_comments(head_of(parameters, others))),
     )
     of_set = replace(description, version=parameters.description_version)
-    return to_eds(of_set, file_name or dcf_name(parameters), configured)
+    return to_eds(of_set, _one_line(file_name or dcf_name(parameters)), configured)
 
 
 def dcf_name(parameters: ParameterSet) -> str:
@@ -102,6 +102,11 @@ def _text(entry: Entry, raw: Raw) -> str | None:
     except (ValueError, OverflowError, TypeError):
         return None
     return text if same and text else None
+
+
+def _one_line(text: str) -> str:
+    """A text of elsewhere that begins no line and no section of its own; as it is it stands in the head."""
+    return "".join(character if character.isprintable() else "_" for character in text)
 
 
 def _comments(head: str) -> Iterator[str]:

@@ -21,6 +21,8 @@ from app.model.strict_json import JsonError, line_of, read_json
 
 FORMAT: Final = "hubside-set/1"
 MAX_NODE: Final = 0xFFFF
+INTEGERS: Final = range(-(1 << 63), 1 << 64)
+"""What the types of CANopen hold, UNSIGNED64 the largest."""
 _EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)
 _PARTS: Final = frozenset(
     ("format", "hash", "complete", "description", "empty", "identity", "origin", "unread", "values")
@@ -75,7 +77,7 @@ def identity_of(values: Mapping[Address, Raw], nameplate: str | None = None) -> 
 
 @dataclass(frozen=True, slots=True)
 class Origin:
-    """Where, when and by whom a set was made. ``time`` is ISO 8601, UTC."""
+    """Where, when and by whom a set was made. ``time`` is ISO 8601 with its offset from UTC; we write UTC."""
 
     turbine: str
     device: str
@@ -89,7 +91,10 @@ class Origin:
     @property
     def t_ns(self) -> int:
         """``time`` in ns since 1970. Raises ValueError where it is none."""
-        since = datetime.fromisoformat(self.time).astimezone(UTC) - _EPOCH
+        moment = datetime.fromisoformat(self.time)
+        if moment.tzinfo is None:
+            raise ValueError("without an offset from UTC, Z or +01:00, it is another instant in every place")
+        since = moment.astimezone(UTC) - _EPOCH
         return since // timedelta(microseconds=1) * 1000
 
     def as_json(self) -> dict[str, Any]:
@@ -205,6 +210,7 @@ class _Reader:
             unread={self._address("unread", key): self._text_of("unread", key, why) for key, why in unread.items()},
             empty=self._empty(content),
         )
+        self._check_integers(parameters)
         self._check(content, parameters)
         return parameters
 
@@ -241,7 +247,7 @@ class _Reader:
         try:
             known = 0 <= origin.t_ns < 1 << 63
         except (ValueError, OverflowError) as error:
-            raise JsonError(self._line("origin", "time"), f"'{origin.time}' is no time") from error
+            raise JsonError(self._line("origin", "time"), f"'{origin.time}' is no time: {error}") from error
         if not known:
             raise JsonError(self._line("origin", "time"), f"'{origin.time}' is no time from 1970 to 2262")
         return origin
@@ -249,6 +255,13 @@ class _Reader:
     def _empty(self, content: dict[str, Any]) -> tuple[Address, ...]:
         part = self._part(content, "empty", list) if "empty" in content else []
         return tuple(self._address("empty", self._text_of("empty", str(key), key)) for key in part)
+
+    def _check_integers(self, parameters: ParameterSet) -> None:
+        for address, raw in parameters.values.items():
+            if isinstance(raw, int) and raw not in INTEGERS:
+                raise JsonError(
+                    self._line("values", str(address)), f"{raw} is no raw value: it takes more than 64 bits"
+                )
 
     def _check(self, content: dict[str, Any], parameters: ParameterSet) -> None:
         """What the parts say of each other."""

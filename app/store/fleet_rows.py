@@ -12,18 +12,21 @@ from app.model.set_vector import layout_of, pack
 from app.model.sets import ParameterSet
 from app.store.schema import set_latest, set_layouts, set_records
 
+AHEAD_NS: Final = 24 * 3600 * 1_000_000_000
+"""So far may the clock go ahead by which a set was taken; what is beyond says nothing of when it was."""
 CHUNK: Final = 128
 """Rows that are handed on at once: a few hundred kilobytes, which stay in the processor's cache."""
 
 
-def keep_latest(connection: Connection, record_id: str, parameters: ParameterSet) -> None:
+def keep_latest(connection: Connection, record_id: str, parameters: ParameterSet, now_ns: int) -> None:
     """A record was added: it is the latest of its device, unless a later one is there.
 
-    A fragment never takes the place of a complete set, however late it is: what it lacks would pass for equal.
+    A fragment never takes the place of a complete set, however late it is: what it lacks would pass for equal. Nor does
+    a set whose time is ahead (``AHEAD_NS``) take that of one whose time is not, and it gives its own to any such.
     """
     device, t_ns = parameters.origin.device, parameters.origin.t_ns
-    known = _rank_of_latest(connection, device)
-    if known is not None and known > (parameters.complete, t_ns):
+    known = _rank_of_latest(connection, device, now_ns)
+    if known is not None and known > (parameters.complete, t_ns <= now_ns + AHEAD_NS, t_ns):
         return
     layout = layout_of(parameters.values)
     row = {
@@ -37,12 +40,12 @@ def keep_latest(connection: Connection, record_id: str, parameters: ParameterSet
     connection.execute(insert(set_latest), row)
 
 
-def _rank_of_latest(connection: Connection, device: str) -> tuple[bool, int] | None:
-    """Whether the latest set of a device is complete, and its time; None where there is none."""
+def _rank_of_latest(connection: Connection, device: str, now_ns: int) -> tuple[bool, bool, int] | None:
+    """Whether the latest set of a device is complete, and its time can be; and its time. None where there is none."""
     joined = set_latest.join(set_records, set_records.c.id == set_latest.c.record_id)
     query = select(set_latest.c.t_ns, set_records.c.unread).select_from(joined).where(set_latest.c.device == device)
     row = connection.execute(query).first()
-    return None if row is None else (not json.loads(row.unread), row.t_ns)
+    return None if row is None else (not json.loads(row.unread), row.t_ns <= now_ns + AHEAD_NS, row.t_ns)
 
 
 def layouts_of(connection: Connection, description_id: str) -> dict[int, tuple[str, tuple[str, ...]]]:

@@ -22,7 +22,7 @@ from app.errors import StoreError
 from app.model.address import parse_address
 from app.model.set_record import SetRecord, Source, Tag, TagEntry
 from app.model.sets import Identity, Origin, ParameterSet, iso_time, parse_content
-from app.store.fleet_rows import keep_latest
+from app.store.fleet_rows import AHEAD_NS, keep_latest
 from app.store.schema import nameplates, set_contents, set_evidence, set_records, set_tags
 from app.store.schema import set_files as files
 
@@ -50,7 +50,7 @@ class Nameplate:
     t_ns: int
 
 
-def put_set(connection: Connection, new_id: str, parameters: ParameterSet, source: Source) -> SetRecord:
+def put_set(connection: Connection, new_id: str, parameters: ParameterSet, source: Source, now_ns: int) -> SetRecord:
     """Keep a set; one that was taken on the same occasion already is not kept again. Gives its record."""
     origin, digest = parameters.origin, parameters.hash
     known = connection.execute(
@@ -86,7 +86,7 @@ def put_set(connection: Connection, new_id: str, parameters: ParameterSet, sourc
             "source": source.value,
         },
     )
-    keep_latest(connection, new_id, parameters)
+    keep_latest(connection, new_id, parameters, now_ns)
     return _record(connection.execute(_records().where(set_records.c.id == new_id)).one())
 
 
@@ -119,9 +119,10 @@ def get_set(connection: Connection, record: SetRecord) -> ParameterSet | None:
     )
 
 
-def list_records(connection: Connection, wanted: Filter) -> list[SetRecord]:
-    """Records, latest first."""
-    query = _records().order_by(set_records.c.t_ns.desc(), set_records.c.id.desc()).limit(wanted.limit)
+def list_records(connection: Connection, wanted: Filter, now_ns: int) -> list[SetRecord]:
+    """Records, latest first; those whose time is ahead (``AHEAD_NS``) stand last."""
+    ahead = set_records.c.t_ns > now_ns + AHEAD_NS
+    query = _records().order_by(ahead, set_records.c.t_ns.desc(), set_records.c.id.desc()).limit(wanted.limit)
     if wanted.turbine is not None:
         query = query.where(set_records.c.turbine == wanted.turbine)
     if wanted.device is not None:

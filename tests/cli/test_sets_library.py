@@ -13,7 +13,7 @@ import pytest
 
 from app.cli.main import main
 from app.model.sets import dump_set, iso_time
-from tests.model.set_rig import whole_set
+from tests.model.set_rig import ORIGIN, whole_set
 from tests.web.rig import ROOT
 
 VISIT = ROOT / "recordings" / "scenarios" / "7-service-visit.mcap"
@@ -105,6 +105,20 @@ def test_sets_come_out_of_a_recording_with_the_instant_and_direction_of_each_val
     assert_shown_as_seen(sets, found["wtg-07/blade-2/pmc"])
     assert sets("recover", VISIT.with_name("none.mcap"))[0] == 2
     assert sets("recover", VISIT, "--node", "12=nobody")[0] == 2
+
+
+def test_a_set_from_a_time_to_come_is_taken_with_a_word_and_one_from_no_place_is_not(
+    sets: Sets, tmp_path: Path
+) -> None:
+    ahead, naive = tmp_path / "ahead.json", tmp_path / "naive.json"
+    ahead.write_text(dump_set(whole_set("oat-pmc", replace(ORIGIN, time="2199-01-01T00:00:00Z"))))
+    naive.write_text(dump_set(whole_set("oat-pmc", replace(ORIGIN, time="2026-01-01T00:00:00"))))
+    code, _out, err = sets("import", ahead)
+    assert code == 0 and "2199-01-01T00:00:00Z" in err and "ahead of this computer" in err
+    line = next(n for n, line in enumerate(naive.read_text().splitlines(), 1) if '"time"' in line)
+    code, _out, err = sets("import", naive)
+    assert code == 2 and f"naive.json, line {line}: " in err and "offset from UTC" in err
+    assert len(sets.json("list")) == 1
 
 
 def assert_shown_as_seen(sets: Sets, one: dict[str, Any]) -> None:

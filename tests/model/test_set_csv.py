@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+from dataclasses import replace
 
 import pytest
 from hypothesis import given, settings
@@ -11,9 +12,11 @@ from hypothesis import strategies as st
 
 from app.errors import SetFileError
 from app.model.address import Address
+from app.model.datatypes import Raw
 from app.model.set_csv import dump_csv, load_csv
 from app.model.set_import import read_set_file
-from tests.model.set_rig import DESCRIPTIONS, taking, whole_set
+from app.model.sets import ParameterSet, dump_set, load_set
+from tests.model.set_rig import DESCRIPTIONS, any_set, taking, whole_set
 
 TABLE = "address,name,raw,value,unit\n6065,window,1234,12.34,°\n1017,heartbeat,500,500,ms\n2FFF,other,1,1,\n"
 
@@ -66,6 +69,12 @@ def test_a_changed_value_is_refused_unless_the_values_are_wanted_as_they_are() -
         ("1234", "twelve", 2, "'twelve' is no raw value"),
         ("1234", "", 2, "is no raw value"),
         ("1234", "hex:0x", 2, "is no raw value"),
+        ("1234", "18446744073709551616", 2, "is no raw value"),
+        ("1234", "1e999", 2, "is no raw value"),
+        ("1234", 'json:"\\ud800"', 2, "is no raw value"),
+        ("1234", "json:7", 2, "is no raw value"),
+        ("window,1234", '"win\ndow",many', 2, "is no raw value"),
+        ("1017,heartbeat", '"10\n17",heartbeat', 3, "no address"),
         ("6065,window,1234,12.34,°", "6065", 2, "ends too early"),
         ("1017", "6065", 3, "twice"),
         ("raw", "row", 1, "no column 'raw'"),
@@ -81,6 +90,75 @@ def test_a_damaged_file_names_line_and_reason(old: str, new: str, line: int, rea
         load_csv(text, "x.csv", taking())
     assert reason in refused.value.details["reason"]
     assert refused.value.details["line"] == line
+
+
+@settings(max_examples=150, deadline=None)
+@given(any_set())
+def test_any_set_comes_back_from_its_file(parameters: ParameterSet) -> None:
+    for description in (DESCRIPTIONS["oat-pmc"], None):
+        data = dump_csv(parameters, description).encode()
+        read = read_set_file(data, "x.csv", taking(origin=None, descriptions={})).parameters
+        assert read == parameters
+        assert read.hash == parameters.hash, "minus zero too"
+
+
+def test_a_value_that_no_cell_can_hold_comes_back() -> None:
+    values: dict[Address, Raw] = {
+        Address(0x1F50): bytes(150_000),
+        Address(0x1008): "x" * 150_000,
+        Address(0x1009): "\x7f" * 50_000,
+    }
+    parameters = replace(whole_set("oat-pmc"), values=values, unread={}, empty=())
+    text = dump_csv(parameters, DESCRIPTIONS["oat-pmc"])
+    assert read_set_file(text.encode(), "x.csv", taking()).parameters == parameters
+
+
+@pytest.mark.parametrize(
+    "text", ["a\r\nb\rc\nd", "\0", "=cmd()", "'=1", '"', ' "a", ', "\ufeff", "\u2028", "", "x\ty;z"]
+)
+def test_a_text_comes_back_as_it_went_out_also_where_the_values_only_are_read(text: str) -> None:
+    parameters = whole_set("oat-pmc")
+    parameters = replace(parameters, values={**parameters.values, Address(0x1008): text})
+    data = dump_csv(parameters, DESCRIPTIONS["oat-pmc"]).encode()
+    assert b"\0" not in data
+    for how in (taking(), taking(as_values=True)):
+        read = read_set_file(data, "x.csv", how)
+        where = [one.line for one in read.unknown if one.address == Address(0x1008)]
+        assert where or read.parameters.values[Address(0x1008)] == text
+        assert bool(where) is (how.as_values and not text.isascii()), "1008h is an ASCII text"
+
+
+CELLS = st.one_of(
+    st.sampled_from(["6065", "6065:00", "1008", "12/221", "text:", 'json:"a"', 'json:"\\ud800"', "json:1", "json:["]),
+    st.sampled_from(
+        ["hex:00", "hex:0g", "1" * 25, "18446744073709551615", "18446744073709551616", "0xFFFFFFFFFFFFFFFF"]
+    ),
+    st.sampled_from(
+        ["1e999", "-1.5e308", "nan", "1_0", "12,5", "#hubside-set", '{"format":"hubside-set/1"}', '"', "\0"]
+    ),
+    st.text(max_size=4),
+)
+
+
+@settings(max_examples=400, deadline=None)
+@given(st.lists(st.lists(CELLS, max_size=5), max_size=5), st.sampled_from(",;\t"), st.booleans(), st.booleans())
+def test_any_other_table_is_a_set_or_an_error_with_line_and_reason(
+    rows: list[list[str]], delimiter: str, as_values: bool, quoted: bool
+) -> None:
+    out = io.StringIO(newline="")
+    out.write(delimiter.join(("address", "raw", "value")) + "\r\n6065" + delimiter + "1\r\n")
+    if quoted:
+        csv.writer(out, delimiter=delimiter).writerows(rows)
+    else:
+        out.write("\n".join(delimiter.join(row) for row in rows))
+    data = out.getvalue().encode("utf-8", "replace")
+    try:
+        read = read_set_file(data, "x.csv", taking(as_values=as_values))
+    except SetFileError as error:
+        assert 1 <= error.details["line"] <= data.count(b"\n") + data.count(b"\r") + 1
+        assert error.details["reason"]
+    else:
+        assert load_set(dump_set(read.parameters), "x.json") == read.parameters, "it can be kept"
 
 
 @settings(max_examples=150, deadline=None)

@@ -10,13 +10,14 @@ from pathlib import Path
 import canopen
 import pytest
 from canopen.objectdictionary import ODVariable
+from hypothesis import given, settings
 
 from app.errors import SetFileError
-from app.model.address import Address
+from app.model.address import Address, Addressing
 from app.model.set_dcf import dcf_name, dump_dcf, load_dcf
 from app.model.set_import import read_set_file
 from app.model.sets import ParameterSet
-from tests.model.set_rig import DESCRIPTIONS, ORIGIN, taking, whole_set
+from tests.model.set_rig import DESCRIPTIONS, ORIGIN, any_set, taking, whole_set
 from tests.model.test_eds_write import DCFCHK
 
 DEVICES = ["oat-pmm", "oat-pmc"]
@@ -75,6 +76,18 @@ def test_the_very_set_comes_back(device: str) -> None:
     assert read.parameters == parameters
     assert (read.unknown, read.foreign) == ((), False)
     assert max(map(len, text.splitlines())) < 256
+
+
+@settings(max_examples=40, deadline=None)
+@given(any_set())
+def test_any_set_of_the_device_comes_back(parameters: ParameterSet) -> None:
+    """Whatever it says of itself: a name with a line end in it begins no section."""
+    own = {address: raw for address, raw in parameters.values.items() if address.addressing is Addressing.OD}
+    parameters = replace(parameters, values=own)
+    text = dump_dcf(parameters, DESCRIPTIONS["oat-pmc"])
+    read = load_dcf(text.encode(), "x.dcf", taking(origin=None, descriptions={})).parameters
+    assert read == parameters
+    assert read.hash == parameters.hash
 
 
 @pytest.mark.parametrize("device", DEVICES)

@@ -78,6 +78,8 @@ def test_an_instant_is_written_as_it_is_read(text: str, t_ns: int) -> None:
     assert origin.t_ns == t_ns
     assert iso_time(t_ns) == text
     assert dataclasses.replace(ORIGIN, time="2026-03-04T15:03:21+01:00").t_ns == 1_772_633_001_000_000_000
+    with pytest.raises(ValueError, match="offset"):
+        assert dataclasses.replace(ORIGIN, time="2026-03-04T15:03:21").t_ns
 
 
 @pytest.mark.parametrize(
@@ -105,6 +107,10 @@ def test_an_instant_is_written_as_it_is_read(text: str, t_ns: int) -> None:
         ('"node": 1', '"node": "1"', '"node"', "no number"),
         ('"person": "A. Technician",', "", '"origin"', "missing"),
         ("2026-03-04T14:03:21Z", "yesterday", '"time"', "no time"),
+        ("2026-03-04T14:03:21Z", "2026-03-04T14:03:21", '"time"', "offset from UTC"),
+        ("2026-03-04T14:03:21Z", "2026-03-04", '"time"', "offset from UTC"),
+        ('"3110:01": 500', '"3110:01": 18446744073709551616', '"3110:01"', "64 bits"),
+        ('"3110:01": 500', '"3110:01": -9223372036854775809', '"3110:01"', "64 bits"),
         ("2026-03-04T14:03:21Z", "9999-12-31T00:00:00Z", '"time"', "1970 to 2262"),
         ("2026-03-04T14:03:21Z", "1914-12-31T00:00:00Z", '"time"', "1970 to 2262"),
         ('"node": 1', '"node": 70000', '"node"', "from 0 to"),

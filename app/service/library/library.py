@@ -15,6 +15,7 @@ from app.model.sets import ParameterSet
 from app.service.library.recovered import Recovered, Seen
 from app.service.office.audit import Action, AuditLog
 from app.store import set_rows
+from app.store.fleet_rows import AHEAD_NS
 from app.store.set_rows import Filter, Nameplate
 from app.store.store import Connection, Store
 from app.store.uuid7 import Uuid7
@@ -45,7 +46,7 @@ class Library:
 
     def put_in(self, connection: Connection, parameters: ParameterSet, source: Source) -> SetRecord:
         """As ``put``, one set within a transaction of the store's thread."""
-        return set_rows.put_set(connection, self._new_id(), parameters, source)
+        return set_rows.put_set(connection, self._new_id(), parameters, source, self._stamp())
 
     async def record(self, key: str) -> SetRecord:
         """The record with an id, or the latest of the content whose hash begins so. Raises SetUnknownError."""
@@ -68,9 +69,16 @@ class Library:
         return found
 
     async def records(self, wanted: Filter | None = None) -> list[SetRecord]:
-        """Records, latest first."""
-        asked = wanted or Filter()
-        return await self._store.run(lambda kept: set_rows.list_records(kept, asked))
+        """Records, latest first; those whose time is ahead stand last."""
+        asked, now_ns = wanted or Filter(), self._stamp()
+        return await self._store.run(lambda kept: set_rows.list_records(kept, asked, now_ns))
+
+    def is_ahead(self, record: SetRecord) -> bool:
+        """True where its time is more than a day ahead of ours: it says nothing of when the set was taken.
+
+        Such a set is kept as it is, and is the latest of its device only as long as there is no other.
+        """
+        return record.t_ns > self._stamp() + AHEAD_NS
 
     async def put_recovered(self, recovered: Recovered, recording: str, person: str) -> list[SetRecord]:
         """Keep the sets of a recording, each with how its values were seen."""

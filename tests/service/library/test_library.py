@@ -43,7 +43,7 @@ def at(text: str, name: str = "oat-pmc") -> ParameterSet:
 
 
 async def test_a_content_is_kept_once_and_each_occasion_is_a_record(tmp_path: Path) -> None:
-    first, later = at("2026-03-04T14:03:21Z"), at("2027-03-04T14:03:21Z")
+    first, later = at("2024-03-04T14:03:21Z"), at("2025-03-04T14:03:21Z")
     async with library_in(tmp_path) as (library, store):
         (one,) = await library.put([first], Source.BACKUP)
         (again,) = await library.put([first], Source.FILE)
@@ -131,6 +131,41 @@ async def test_a_set_with_unread_objects_is_never_golden(tmp_path: Path) -> None
         assert await tagged_ids(library, Tag.GOLDEN) == set()
         await library.tag(record.id, Tag.AS_DELIVERED, "eva")
         assert await tagged_ids(library, Tag.AS_DELIVERED) == {record.id}
+
+
+async def test_a_set_from_a_time_to_come_is_kept_and_is_not_the_latest_for_ever(tmp_path: Path) -> None:
+    """A clock that was ahead by years, once: what is taken by a right one afterwards is the latest again."""
+    clock = [parse_time("2026-03-04T12:00:00Z")]
+    now, soon, wrong = "2026-03-04T11:00:00Z", "2026-03-05T11:00:00Z", "2031-03-04T11:00:00Z"
+    store = Store.open(tmp_path)
+    audit = AuditLog(store)
+    library = Library(store, audit, lambda: clock[0])
+    try:
+        (ahead,) = await library.put([at(wrong)], Source.FILE)
+        assert library.is_ahead(ahead) and await latest(store) == [ahead.id], "there is no other"
+        (record,) = await library.put([at(now)], Source.BACKUP)
+        (early,) = await library.put([at(soon)], Source.FILE)
+        assert not library.is_ahead(record) and not library.is_ahead(early), "a day is no matter"
+        assert await latest(store) == [early.id]
+        (again,) = await library.put([at("2031-03-05T11:00:00Z")], Source.FILE)
+        assert await latest(store) == [early.id]
+        assert [one.id for one in await library.records()] == [early.id, record.id, again.id, ahead.id]
+        assert (await library.get(ahead.id)).origin.time == wrong, "it is kept as it is"
+        clock[0] = parse_time("2031-04-01T12:00:00Z")
+        assert (await library.records())[0].id == again.id, "its time has come"
+    finally:
+        await audit.close()
+        store.close()
+
+
+def parse_time(text: str) -> int:
+    return replace(ORIGIN, time=text).t_ns
+
+
+async def latest(store: Store) -> list[str]:
+    """The records that stand for their devices in a comparison of the fleet."""
+    rows = await store.run(lambda kept: kept.exec_driver_sql("SELECT record_id FROM set_latest").all())
+    return [row[0] for row in rows]
 
 
 async def tagged_ids(library: Library, tag: Tag) -> set[str]:
