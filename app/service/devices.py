@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from app.model.address import Address
@@ -45,8 +46,12 @@ class Target:
 
 
 def decode(entry: Entry, data: bytes) -> Raw:
-    """Raw value of what came over the wire; bytes as they are where their length is not the type's."""
+    """Raw value of what came over the wire; bytes as they are where their length is not the type's.
+
+    So are floats that are no number (infinite, NaN): sets and everything in JSON have no way to hold them.
+    """
     try:
-        return decode_raw(entry.type, data)
+        raw = decode_raw(entry.type, data)
     except ValueError:
         return data
+    return data if isinstance(raw, float) and not math.isfinite(raw) else raw
