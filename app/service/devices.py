@@ -4,13 +4,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Final
 
+from app.drivers.contract import Driver
+from app.errors import BusLostError
 from app.model.address import Address
 from app.model.datatypes import Raw, decode_raw
 from app.model.description import Description, Entry
+from app.model.sets import IDENTITY, Identity, identity_of
 from app.model.site import Device
 from app.service.gate import OPEN, Gate
 from app.wire.live import LiveState
+
+_WHO: Final = tuple(IDENTITY[name] for name in ("vendor_id", "product_code", "serial"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +45,25 @@ class Target:
         if view is None or view.reading is None or entry is None:
             return None
         return decode(entry, view.reading.data)
+
+    async def pass_gate(self, driver: Driver) -> None:
+        """Raises RestoreOpenError where a restore of the device is not finished.
+
+        Its identity is read for that where nobody has seen it yet. Raises BusLostError, ConsentError.
+        """
+        await self.gate.check(self.device, lambda: self._identity(driver))
+
+    async def _identity(self, driver: Driver) -> Identity:
+        """What the device says of itself; nothing where it does not answer."""
+        wanted = [address for address in _WHO if address in self.description.entries]
+        unknown = [address for address in wanted if self.lookup(address) is None]
+        found = {address: raw for address in wanted if (raw := self.lookup(address)) is not None}
+        for address, answer in (await driver.read_many(self.node, unknown)).items() if unknown else ():
+            if isinstance(answer, bytes):
+                found[address] = decode(self.entry(address), answer)
+            elif isinstance(answer, BusLostError):
+                raise answer
+        return identity_of(found)
 
     def entry(self, address: Address) -> Entry:
         """The entry at ``address``. Raises UnknownObjectError."""

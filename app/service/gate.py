@@ -1,34 +1,65 @@
 """The gate before every write, save and restart: shut for a station whose restore is not finished.
 
-Its values may be half old, half new then. STOP, FEATHER and reading never come through here.
+Its values may be half old, half new then. A device is known by the name of its station, and under any other name, or on
+any other adapter, by what it says of itself. STOP, FEATHER and reading never come through here.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import os
+from collections.abc import Awaitable, Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from app.errors import RestoreOpenError
+from app.drivers.can_config import parse_can
+from app.errors import RestoreOpenError, UsageError
+from app.model.sets import Identity
 from app.model.site import Device
 from app.model.station import station_slug
 
 BARE_TURBINE: Final = "bus"
 """Slug of a turbine that no site file names: nothing but the adapter and the node says which device it is."""
+_OWN_HOST: Final = "127.0.0.1"
+_OWN_NAMES: Final = ("localhost", "::1")
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where a device is reached: adapter (``adapter_of``) and node."""
+
+    adapter: str
+    node: int
 
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """An open restore: the station that it blocks, and where its devices are: adapter and node of each."""
+    """An open restore: the station that it blocks, and each of its devices: where it is, and what it says of itself."""
 
     restore: str
     station: str
-    places: frozenset[tuple[str, int]]
+    devices: tuple[tuple[Place, Identity], ...]
 
     @property
     def is_bare(self) -> bool:
         """True where its turbine has no name."""
-        return self.station.startswith(f"{BARE_TURBINE}/")
+        return _is_bare(self.station)
+
+    def names(self, station: str) -> bool:
+        """True where the station is its own by name."""
+        return self.station == station and not self.is_bare
+
+    def holds(self, station: str, place: Place, identity: Identity) -> bool:
+        """True where a device of ``station`` is one of its own, under whatever name.
+
+        By the serial number. Where one of both tells none, the same place counts, if one of both has no name.
+        """
+        if self.names(station):
+            return True
+        unnamed = self.is_bare or _is_bare(station)
+        return any(
+            _is_same(theirs, identity) if theirs.serial and identity.serial else unnamed and where == place
+            for where, theirs in self.devices
+        )
 
 
 class Blocks:
@@ -43,28 +74,51 @@ class Blocks:
 
 
 class Gate:
-    """The gate of one connection. ``adapters`` by name of the bus; a bit rate behind ``@`` does not count."""
+    """The gate of one connection. ``adapters`` by name of the bus."""
 
     def __init__(self, adapters: Mapping[str, str], blocks: Blocks) -> None:
         self._adapters = {name: adapter_of(connection) for name, connection in adapters.items()}
         self.blocks = blocks
 
-    def check(self, device: Device) -> None:
-        """Raises RestoreOpenError where a restore of the device's station is open.
+    async def check(self, device: Device, ask: Callable[[], Awaitable[Identity]]) -> None:
+        """Raises RestoreOpenError where a restore of the device is open. ``ask`` reads what it says of itself.
 
-        Where one of both is a bare bus, the same node on the same adapter is taken for the same device.
+        It is asked only where some restore is open and no name decides.
         """
-        station = station_slug(device.slug)
-        place = self._adapters.get(device.bus, ""), device.node
+        blocks, station = self.blocks.now, station_slug(device.slug)
+        for block in blocks:
+            if block.names(station):
+                raise RestoreOpenError(station=block.station, restore=block.restore, device=device.slug)
+        if blocks:
+            self.require_open(device, await ask())
+
+    def require_open(self, device: Device, identity: Identity) -> None:
+        """Raises RestoreOpenError where a restore of the device is open."""
+        place = Place(self._adapters.get(device.bus, ""), device.node)
         for block in self.blocks.now:
-            unnamed = block.is_bare or station.startswith(f"{BARE_TURBINE}/")
-            if (place in block.places) if unnamed else (block.station == station):
+            if block.holds(station_slug(device.slug), place, identity):
                 raise RestoreOpenError(station=block.station, restore=block.restore, device=device.slug)
 
 
 def adapter_of(connection: str) -> str:
-    """``socketcan:can0`` of ``socketcan:can0@500000``."""
-    return connection.partition("@")[0]
+    """One spelling for one adapter: no bit rate, one name for our own host, a device file by its real path."""
+    try:
+        can = parse_can(connection)
+    except UsageError:
+        return connection.partition("@")[0]
+    channel = os.path.realpath(can.channel) if can.channel.startswith("/") else can.channel
+    host = _OWN_HOST if can.host.lower() in _OWN_NAMES else can.host.lower()
+    return f"{can.interface.value}:{host}:{can.port}/{channel}" if host else f"{can.interface.value}:{channel}"
+
+
+def _is_bare(station: str) -> bool:
+    return station.startswith(f"{BARE_TURBINE}/")
+
+
+def _is_same(one: Identity, other: Identity) -> bool:
+    """The same serial number, of no other maker and product as far as both are known."""
+    pairs = ((one.vendor_id, other.vendor_id), (one.product_code, other.product_code))
+    return one.serial == other.serial and all(a is None or b is None or a == b for a, b in pairs)
 
 
 OPEN: Final = Gate({}, Blocks())

@@ -37,7 +37,7 @@ async def save(
 
     Raises SdoAbortError, NoAnswerError or UnverifiedError; then nothing is known of the non-volatile memory.
     """
-    target.gate.check(target.device)
+    await target.pass_gate(driver)
     command = save_command(target, category)
     data = encode_raw(DataType.UNSIGNED32, command.signature)
     started_ns = now_ns()
@@ -59,7 +59,7 @@ async def restart(
 
     ``sure`` raises what speaks against it at the last moment: nothing else comes between it and the command.
     """
-    target.gate.check(target.device)
+    await target.pass_gate(driver)
     if sure is not None:
         sure()
     started_ns = now_ns()

@@ -68,7 +68,7 @@ async def write_raw(
     """
     known = driver.commanded(target.node, address) if known is None else known
     entry = target.entry(address)
-    target.gate.check(target.device)
+    await target.pass_gate(driver)
     await _know_what_it_rests_on(driver, target, entry)
     data = check_write(target.description, entry, raw, target.lookup, allow=allow)
     was = decode(entry, await driver.read(target.node, address, entry.timeout_s)) if entry.access.readable else None

@@ -70,7 +70,7 @@ async def write_many(job: Job, order: Order, journal: Journal, now_ns: Callable[
     job ends between two writes, never within one. A lost bus ends it as well. What failed stands in the rows.
     """
     rows = list(zip(order.changes, job.rows, strict=True))
-    _check_all(rows, order.allow)
+    await _check_all(rows, order.allow)
     job.done = sum(row.state is RowState.REFUSED for row in job.rows)
     if job.done and order.on_failure is OnFailure.STOP:
         return
@@ -90,7 +90,7 @@ async def write_many(job: Job, order: Order, journal: Journal, now_ns: Callable[
             await _whole(_save(own, journal, now_ns))
 
 
-def _check_all(rows: Sequence[tuple[Change, JobRow]], allow: Allow) -> None:
+async def _check_all(rows: Sequence[tuple[Change, JobRow]], allow: Allow) -> None:
     """Refuse what cannot be written, with the values that the rows before it will have set."""
     planned: dict[tuple[str, Address], Raw] = {}
     for change, row in rows:
@@ -101,7 +101,7 @@ def _check_all(rows: Sequence[tuple[Change, JobRow]], allow: Allow) -> None:
             return target.lookup(address) if found is None else found
 
         try:
-            target.gate.check(target.device)
+            await target.pass_gate(change.driver)
             check_write(target.description, target.entry(change.address), change.raw, lookup, allow=allow)
         except HubsideError as error:
             row.state, row.error = RowState.REFUSED, error

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 
-from app.service.gate import Block
+from app.model.sets import Identity
+from app.service.gate import Block, Place, adapter_of
 from app.store.restore_rows import RestoreRow
 
 
 def block_of(row: RestoreRow) -> Block:
     """What an open restore blocks."""
     devices = json.loads(row.details)["devices"]
-    return Block(row.id, row.station, frozenset((one["adapter"], one["node"]) for one in devices))
+    found = ((Place(adapter_of(one["adapter"]), one["node"]), Identity(**one["identity"])) for one in devices)
+    return Block(row.id, row.station, tuple(found))

@@ -38,7 +38,7 @@ from app.service.restore.blocking import block_of
 from app.service.restore.log import Kept, RestoreLog, event, load, new_row, value_rows
 from app.service.restore.motor_given import note_motors
 from app.service.restore.order import Broken, Cause, Order, Timing
-from app.service.restore.prepare import Prepared, prepare
+from app.service.restore.prepare import Prepared, open_at, prepare
 from app.service.restore.record import RecordOf, outcome_of
 from app.service.restore.steps import Hands
 from app.service.restore.survey import Progress, Survey, targets_of
@@ -138,7 +138,7 @@ class Desk:
         """Plan, and what speaks against it. Reads the devices and writes nothing."""
         self.require_idle()
         plates = {slug: plate.serial for slug, plate in self._office.library.nameplates.items()}
-        return await prepare(connection, order, plates, self._open_at(connection, order.station), on_progress)
+        return await prepare(connection, order, plates, on_progress)
 
     async def begin(self, connection: Connection, prepared: Prepared, agreed: str | None = None) -> str:
         """Begin what was prepared just now; gives the id of the restore, which runs in the background.
@@ -154,7 +154,7 @@ class Desk:
             raise RestoreRefusedError(station=order.station, count=len(refusals), refusals=refusals)
         async with self._starting:
             self.require_idle()
-            found = self._open_at(connection, order.station)
+            found = open_at(connection, prepared.targets, prepared.found)
             if found is not None:
                 raise RestoreOpenError(station=order.station, restore=found)
             return await self._begin(connection, prepared)
@@ -363,9 +363,6 @@ class Desk:
 
     def _shut(self) -> None:
         self.blocks.put(block_of(row) for row in self._open.values())
-
-    def _open_at(self, connection: Connection, station: str) -> str | None:
-        return next((row.id for row in self._open.values() if row.station == station), None)
 
     async def _keep(self, found: Survey, reason: str, person: str, source: Source) -> list[SetRecord]:
         """Sets go to the library; a store that fails holds up no restore."""

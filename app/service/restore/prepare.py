@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from app.errors import UsageError
+from app.errors import RestoreOpenError, UsageError
 from app.model.datatypes import Raw
 from app.model.restore.plan import Plan, Treatment
 from app.model.restore.planner import make_plan, plan_hash
@@ -46,10 +46,9 @@ async def prepare(
     connection: Connection,
     order: Order,
     nameplates: Mapping[str, str | None],
-    open_restore: str | None = None,
     on_progress: Progress | None = None,
 ) -> Prepared:
-    """Read the station, plan, and look for whatever speaks against it. ``open_restore``: one that is not finished.
+    """Read the station, plan, and look for whatever speaks against it.
 
     Raises UsageError (no such station or device), NoAnswerError, BusLostError, ConsentError.
     """
@@ -61,6 +60,7 @@ async def prepare(
     }
     wanted = {slug: given.parameters for slug, given in order.given.items()}
     plan = make_plan(found.station, wanted, order.options(same_unit), found.states)
+    open_restore = open_at(connection, targets, found)
     refusals = [
         *([] if open_restore is None else [Refusal(Objection.RESTORE_OPEN, "", {"restore": open_restore})]),
         *precheck.objections_to_sets(order, found, nameplates),
@@ -71,6 +71,16 @@ async def prepare(
     if not (order.others_confirmed and order.expert):
         refusals += await precheck.objections_to_other_blades(connection, order.station)
     return Prepared(order, targets, found, plan, same_unit, tuple(refusals), _hash(order, plan, found))
+
+
+def open_at(connection: Connection, targets: Iterable[Target], found: Survey) -> str | None:
+    """A restore of one of the devices that is not finished, whatever name they had in it; None where there is none."""
+    for target in targets:
+        try:
+            connection.gate.require_open(target.device, found.sets[target.slug].identity)
+        except RestoreOpenError as error:
+            return str(error.details["restore"])
+    return None
 
 
 def targets_in(connection: Connection, order: Order) -> tuple[Target, ...]:
