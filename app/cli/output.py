@@ -36,6 +36,7 @@ class Output:
 
     def line(self, text: str) -> None:
         """One line of the result."""
+        self._end_progress()
         print(text, file=self._out, flush=True)
 
     def raw(self, text: str) -> None:

@@ -6,7 +6,7 @@ import argparse
 import importlib
 from typing import Final
 
-PARTS: Final = ("sets_library", "sets_diff", "sets_fleet", "sets_rules")
+PARTS: Final = ("sets_library", "sets_recover", "sets_diff", "sets_fleet", "sets_rules")
 """Modules of this package, in the order of the help."""
 
 

@@ -1,4 +1,4 @@
-"""``hubside sets list|show|import|export|tag|recover|nameplate``: the library, while no server has the data folder."""
+"""``hubside sets list|show|import|export|tag|nameplate``: the library, while no server has the data folder."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from app.cli.output import Output
 from app.cli.sets_seen import mark, tell_legend
 from app.cli.users import opened
 from app.errors import SetFileError, UsageError
-from app.model.address import Address, is_decimal
+from app.model.address import Address
 from app.model.description import Description
 from app.model.description_file import BUILTIN, load_builtin
 from app.model.set_csv import dump_csv
@@ -27,9 +27,8 @@ from app.model.sets import Origin, ParameterSet, dump_set, iso_time
 from app.model.values import quantity_of, show
 from app.service.library.folder import SetFolder
 from app.service.library.library import Library
-from app.service.library.recovered import Named, Recovered, Seen, recover_sets
+from app.service.library.recovered import Seen
 from app.store.set_rows import Filter
-from app.wire.records import SdoAccess
 
 Run = Callable[[argparse.Namespace, Output, Library, SetFolder], Coroutine[Any, Any, int]]
 FORMATS: Final = ("json", "dcf", "csv")
@@ -43,7 +42,7 @@ def add_actions(actions: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
     def action(name: str, run: Run, text: str) -> argparse.ArgumentParser:
         one = actions.add_parser(name, help=text)
-        one.set_defaults(run=lambda arguments, output: run_command(_with_library(arguments, output, run)))
+        one.set_defaults(run=lambda arguments, output: run_command(with_library(arguments, output, run)))
         return one
 
     listing = action("list", _list, "all sets of the library, the newest first")
@@ -67,21 +66,13 @@ def add_actions(actions: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     tag.add_argument("set", help=_SET_HELP)
     tag.add_argument("tag", choices=[one.value for one in Tag if one.by_hand])
     tag.add_argument("--off", action="store_true", help="take it off")
-    recover = action("recover", _recover, "take the sets that the SDO traffic of a recording showed")
-    recover.add_argument("recording", type=Path)
-    recover.add_argument(
-        "--node",
-        action="append",
-        default=[],
-        metavar="NODE=SLUG:DESCRIPTION",
-        help="what a node is, where the recording does not tell; may be repeated",
-    )
     plate = action("nameplate", _nameplate, "the serial number on a device's plate; typed twice to keep it")
     plate.add_argument("device", metavar="SLUG")
     plate.add_argument("serial", nargs="*", help="the serial number, and once more")
 
 
-async def _with_library(arguments: argparse.Namespace, output: Output, run: Run) -> int:
+async def with_library(arguments: argparse.Namespace, output: Output, run: Run) -> int:
+    """Run one action on the library of the data folder. Raises StoreInUseError while a server has it, StoreError."""
     async with opened(arguments) as (store, audit):
         library = Library(store, audit, time.time_ns)
         folder = SetFolder(arguments.settings.sets, store, library)
@@ -99,7 +90,7 @@ async def _list(arguments: argparse.Namespace, output: Output, library: Library,
         for one in await library.records(Filter(arguments.turbine, arguments.device, None, tag))
     ]
     if output.as_json:
-        output.result([_as_dict(one, given) for one, given in rows], "")
+        output.result([record_dict(one, given) for one, given in rows], "")
         return 0
     head = ("ID", "HASH", "TIME", "DEVICE", "UNREAD", "TAGS", "REASON")
     output.table(
@@ -132,7 +123,7 @@ async def _show(arguments: argparse.Namespace, output: Output, library: Library,
     output.line(output.texts("cli.sets.head", **details, hash=record.hash, reason=found.origin.reason or "–"))
     for entry in tags:
         output.line(output.texts("cli.sets.tagged", tag=output.texts(entry.tag.text_key), person=entry.person))
-    description = _known().get(found.description_id)
+    description = known().get(found.description_id)
     rows = [(key, _line(found, key, description)) for key in sorted(found.values)]
     if seen:
         marked = [(*row, mark(seen[key]) if key in seen else "") for key, row in rows]
@@ -154,7 +145,7 @@ def _with_seen(found: ParameterSet, recording: str, seen: Mapping[Address, Seen]
 
 async def _import(arguments: argparse.Namespace, output: Output, library: Library, _folder: SetFolder) -> int:
     """All of the files, or none."""
-    taking = Taking(_known(), _origin(arguments), arguments.description, arguments.as_values)
+    taking = Taking(known(), _origin(arguments), arguments.description, arguments.as_values)
     read = [(path, read_set_file(_bytes(path), path.name, taking)) for path in arguments.file]
     for path, imported in read:
         record = await library.take(imported, path.name, arguments.settings.person)
@@ -162,7 +153,7 @@ async def _import(arguments: argparse.Namespace, output: Output, library: Librar
             details = {"address": unknown.address.short, "name": unknown.name, "line": unknown.line}
             output.say("cli.sets.unknown", **details, reason_key=unknown.text_key)
         text = output.texts("cli.sets.taken", device=record.origin.device, values=record.values, id=record.id)
-        output.result(_as_dict(record, []), text)
+        output.result(record_dict(record, []), text)
         tell_ahead(output, library, record)
     return 0
 
@@ -187,33 +178,9 @@ async def _tag(arguments: argparse.Namespace, output: Output, library: Library, 
     given = [entry.tag for entry in (await library.tags()).get(record.id, [])]
     key = "cli.sets.tag_off" if arguments.off else "cli.sets.tag_on"
     output.result(
-        _as_dict(record, given), output.texts(key, device=record.origin.device, tag=output.texts(tag.text_key))
+        record_dict(record, given), output.texts(key, device=record.origin.device, tag=output.texts(tag.text_key))
     )
     return 0
-
-
-async def _recover(arguments: argparse.Namespace, output: Output, library: Library, _folder: SetFolder) -> int:
-    named = dict(_named(text) for text in arguments.node)
-    found = recover_sets(arguments.recording, _known(), named)
-    records = await library.put_recovered(found, arguments.recording.name, arguments.settings.person)
-    for one, record in zip(found.sets, records, strict=True):
-        written = sum(look.access is SdoAccess.WRITE for look in one.seen.values())
-        doubtful = sum(look.doubt is not None for look in one.seen.values())
-        counts = {"read": len(one.seen) - written, "written": written, "doubtful": doubtful}
-        details = {"device": record.origin.device, "unread": record.unread, "id": record.id, **counts}
-        seen = {address.short: look.as_json() for address, look in one.seen.items()}
-        output.result({**_as_dict(record, []), **counts, "seen": seen}, output.texts("cli.sets.recovered", **details))
-    _tell_rest(output, found)
-    return 0
-
-
-def _tell_rest(output: Output, found: Recovered) -> None:
-    for (bus, node), count in found.nameless.items():
-        output.say("cli.sets.nameless", bus=bus, node=node, values=count)
-    if found.damages:
-        output.say("cli.sets.damages", count=found.damages)
-    if not found.sets:
-        output.say("cli.sets.nothing_seen")
 
 
 async def _nameplate(arguments: argparse.Namespace, output: Output, library: Library, _folder: SetFolder) -> int:
@@ -237,7 +204,8 @@ def tell_ahead(output: Output, library: Library, record: SetRecord) -> None:
         output.say("cli.sets.ahead", device=record.origin.device, time=record.origin.time)
 
 
-def _known() -> dict[str, Description]:
+def known() -> dict[str, Description]:
+    """The descriptions that come along, by id."""
     return {name: load_builtin(name) for name in BUILTIN}
 
 
@@ -252,15 +220,6 @@ def _origin(arguments: argparse.Namespace) -> Origin | None:
     return Origin(slug.partition("/")[0], slug, arguments.node, time_text, person, arguments.reason, tool)
 
 
-def _named(text: str) -> tuple[int, Named]:
-    node, _, what = text.partition("=")
-    slug, _, description = what.rpartition(":")
-    known = _known()
-    if not is_decimal(node) or slug.count("/") != 2 or description not in known:
-        raise UsageError(reason=f"'{text}' is not NODE=TURBINE/STATION/DEVICE:DESCRIPTION")
-    return int(node), Named(slug, known[description])
-
-
 def _bytes(path: Path) -> bytes:
     try:
         return path.read_bytes()
@@ -269,7 +228,7 @@ def _bytes(path: Path) -> bytes:
 
 
 def _file(found: ParameterSet, kind: str) -> str:
-    description = _known().get(found.description_id)
+    description = known().get(found.description_id)
     if kind == "json":
         return dump_set(found)
     if kind == "csv":
@@ -288,7 +247,8 @@ def _line(found: ParameterSet, address: Any, description: Description | None) ->
     return address.short, entry.title, show(entry, raw, lookup), quantity_of(entry, lookup).unit
 
 
-def _as_dict(record: SetRecord, tags: list[Tag]) -> dict[str, Any]:
+def record_dict(record: SetRecord, tags: list[Tag]) -> dict[str, Any]:
+    """A record for machines."""
     origin = record.origin
     return {
         "id": record.id,

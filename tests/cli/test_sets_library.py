@@ -105,6 +105,9 @@ def test_sets_come_out_of_a_recording_with_the_instant_and_direction_of_each_val
     assert_shown_as_seen(sets, found["wtg-07/blade-2/pmc"])
     assert sets("recover", VISIT.with_name("none.mcap"))[0] == 2
     assert sets("recover", VISIT, "--node", "12=nobody")[0] == 2
+    code, _out, err = sets("recover", VISIT, VISIT)
+    assert code == 2 and "at the same time" in err
+    assert len(sets.json("list")) == 6
 
 
 def test_a_set_from_a_time_to_come_is_taken_with_a_word_and_one_from_no_place_is_not(

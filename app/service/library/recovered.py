@@ -1,4 +1,4 @@
-"""Parameter sets out of a recording: what its SDO traffic showed of each device, whoever asked.
+"""Parameter sets out of recordings: what its SDO traffic showed of each device, whoever asked.
 
 Of each object the last transfer counts that was acknowledged; a write that nobody saw end makes the object unknown.
 Every value keeps its instant and its direction. What came before a boot-up or a gap is kept and marked: the device may
@@ -8,7 +8,7 @@ hold another value since, as after a boot-up without a save.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from pathlib import Path
@@ -21,9 +21,9 @@ from app.model.checks import RESTORE_DEFAULTS, STORE_PARAMETERS
 from app.model.datatypes import Raw
 from app.model.description import Description
 from app.model.sets import Origin, ParameterSet, identity_of, iso_time
-from app.recording.content import Event, EventKind
-from app.recording.reader import Recording, open_recording
+from app.recording.content import Event, EventKind, RecordingInfo
 from app.service.devices import decode
+from app.service.library.series import Progress, Series
 from app.wire.decoder import CanOpenDecoder
 from app.wire.frame import Can, Direction
 from app.wire.records import BootUpSeen, Outcome, Record, SdoAccess, SdoSeen
@@ -77,11 +77,15 @@ class RecoveredSet:
 
 @dataclass(frozen=True, slots=True)
 class Recovered:
-    """What a recording gave. ``nameless`` are nodes with SDO traffic of which it is not told what they are."""
+    """What a recording gave. ``nameless`` are nodes with SDO traffic of which it is not told what they are.
+
+    ``name`` is that of its file, or says which files it were.
+    """
 
     sets: tuple[RecoveredSet, ...]
     nameless: Mapping[tuple[str, int], int] = field(default_factory=dict)
     damages: int = 0
+    name: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,34 +133,40 @@ class _Node:
 
 
 def recover_sets(
-    path: Path, described: Mapping[str, Description], named: Mapping[int, Named] | None = None
+    path: Path | Sequence[Path],
+    described: Mapping[str, Description],
+    named: Mapping[int, Named] | None = None,
+    on_progress: Progress | None = None,
 ) -> Recovered:
-    """The sets of one recording file. Takes a while for a long one. Raises RecordingError.
+    """The sets of one recording file, or of several as one (``Series``). Takes a while for a long one.
 
     ``described`` are descriptions by id; ``named`` tells what nodes are, and goes before what the recording tells.
+    Raises RecordingError.
     """
+    paths = [path] if isinstance(path, Path) else path
     try:
-        with open_recording(path) as recording:
-            who = _nodes_of(recording, described, named or {})
-            nodes = _follow(recording)
+        with Series(paths) as series:
+            who = _nodes_of(series.infos, described, named or {})
+            nodes = _follow(series, on_progress)
             sets, nameless = [], {}
             for (bus, number), node in sorted(nodes.items()):
                 name = who.get((bus, number)) or (named or {}).get(number)
                 if name is not None and (node.values or node.failed):
-                    sets.append(_set_of(recording, bus, number, node, name))
+                    sets.append(_set_of(series, bus, number, node, name))
                 elif node.values:
                     nameless[bus, number] = len(node.values)
-            return Recovered(tuple(one for one in sets if one.parameters.values), nameless, len(recording.damages))
+            whole = tuple(one for one in sets if one.parameters.values)
+            return Recovered(whole, nameless, series.damages, series.name)
     except OSError as error:
-        raise RecordingError(file=str(path), offset=0, reason=error.strerror or str(error)) from error
+        raise RecordingError(file=str(paths[0]), offset=0, reason=error.strerror or str(error)) from error
 
 
 def _nodes_of(
-    recording: Recording, described: Mapping[str, Description], named: Mapping[int, Named]
+    infos: Iterable[RecordingInfo], described: Mapping[str, Description], named: Mapping[int, Named]
 ) -> dict[tuple[str, int], Named]:
-    """What the recording says of its nodes (``can0/11`` = slug and description), where the description is known."""
+    """What the files say of their nodes (``can0/11`` = slug and description), where the description is known."""
     found = {}
-    for key, text in recording.info.nodes.items():
+    for key, text in (pair for info in infos for pair in info.nodes.items()):
         bus, _, number = key.rpartition("/")
         slug, _, description = text.rpartition(" ")
         if number.isdecimal() and description in described and int(number) not in named:
@@ -164,11 +174,11 @@ def _nodes_of(
     return found
 
 
-def _follow(recording: Recording) -> dict[tuple[str, int], _Node]:
+def _follow(series: Series, on_progress: Progress | None) -> dict[tuple[str, int], _Node]:
     decoders: dict[str, CanOpenDecoder] = {}
     nodes: dict[tuple[str, int], _Node] = {}
-    gaps = deque(event for event in recording.events() if event.kind in _GAPS)
-    for frame in recording.frames():
+    gaps = deque(event for event in series.events() if event.kind in _GAPS)
+    for frame in series.frames(on_progress):
         while gaps and gaps[0].t_ns <= frame.t_ns:
             _gap(decoders, nodes, gaps.popleft())
         if not isinstance(frame.payload, Can):
@@ -201,7 +211,7 @@ def _take(nodes: dict[tuple[str, int], _Node], record: Record) -> None:
         nodes[record.bus, record.node].doubt(Doubt.BOOT_UP)
 
 
-def _set_of(recording: Recording, bus: str, number: int, node: _Node, name: Named) -> RecoveredSet:
+def _set_of(series: Series, bus: str, number: int, node: _Node, name: Named) -> RecoveredSet:
     entries = name.description.entries
     values: dict[Address, Raw] = {
         address: decode(entries[address], data) for address, data in sorted(node.values.items()) if address in entries
@@ -218,8 +228,8 @@ def _set_of(recording: Recording, bus: str, number: int, node: _Node, name: Name
         device=name.slug,
         node=number,
         time=iso_time(last_ns),
-        person=recording.info.who,
-        reason=f"{recording.path.name}: {len(seen) - written} read, {written} written",
+        person=series.infos[-1].who,
+        reason=f"{series.name}: {len(seen) - written} read, {written} written",
         tool=f"hubside {__version__}",
     )
     parameters = ParameterSet(

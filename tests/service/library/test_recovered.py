@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -11,7 +12,9 @@ from app.errors import RecordingError
 from app.model.address import Address
 from app.model.sets import ParameterSet, load_set
 from app.model.site import load_site
+from app.recording.content import RecorderClock
 from app.recording.reader import open_recording
+from app.recording.writer import RecorderCore, RecorderSettings
 from app.service.as_found import read_as_found
 from app.service.connection import Connection
 from app.service.library.recovered import Doubt, Named, Recovered, RecoveredSet, recover_sets
@@ -90,6 +93,84 @@ def test_what_the_recording_does_not_tell_is_named_by_the_reader() -> None:
     assert one.parameters.origin.device == "wtg-99/blade-9/pmc"
     assert one.parameters.values == of(recover_sets(VISIT, DESCRIPTIONS), "wtg-07/blade-2/pmc").parameters.values
     assert ("can0", 12) not in named.nameless
+
+
+def in_parts(folder: Path, *, cut_s: float, later_ns: int = 0, turbine: str = "wtg-07") -> list[Path]:
+    """The recording of the visit once more, in files of ``cut_s`` each; all of it later by so much."""
+    with open_recording(VISIT) as recording:
+        info, frames = replace(recording.info, turbine=turbine), list(recording.frames())
+    now_ns = frames[0].t_ns + later_ns
+    clock = RecorderClock(lambda: now_ns, lambda: now_ns, lambda: now_ns)
+    settings = RecorderSettings(min_free_bytes=0, max_file_s=cut_s)
+    core = RecorderCore(folder, info, clock, (), settings)
+    for number, frame in enumerate(frames):
+        now_ns = frame.t_ns + later_ns
+        core.write([frame._replace(t_ns=now_ns)])
+        if number % 50 == 0:
+            core.cycle()
+    core.shut()
+    return files(folder)
+
+
+def test_the_parts_of_a_recording_give_what_the_whole_gives_in_whatever_order_they_are_named(tmp_path: Path) -> None:
+    parts = in_parts(tmp_path, cut_s=20)
+    assert len(parts) >= 3
+    whole = recover_sets(VISIT, DESCRIPTIONS)
+    shares: list[float] = []
+    found = recover_sets([parts[-1], *parts[:-1]], DESCRIPTIONS, on_progress=shares.append)
+    assert found.name == f"{parts[0].name} … {parts[-1].name} ({len(parts)})"
+    assert [one.seen for one in found.sets] == [one.seen for one in whole.sets]
+    for one, other in zip(found.sets, whole.sets, strict=True):
+        assert one.parameters.values == other.parameters.values
+        assert one.parameters.unread == other.parameters.unread
+        assert one.parameters.origin == replace(other.parameters.origin, reason=one.parameters.origin.reason)
+        assert one.parameters.origin.reason.startswith(f"{found.name}: ")
+    assert shares[0] < 0.1 and shares[-1] == 1.0 and shares == sorted(shares)
+    assert recover_sets(parts[:1], DESCRIPTIONS).sets != found.sets
+
+
+def test_where_a_part_is_missing_what_was_seen_before_is_in_doubt(tmp_path: Path) -> None:
+    parts = in_parts(tmp_path, cut_s=20)
+    begun_ns = []
+    for path in (parts[0], parts[2]):
+        with open_recording(path) as recording:
+            assert recording.span_ns is not None
+            begun_ns.append(recording.span_ns[0])
+    found = recover_sets([parts[0], parts[2]], DESCRIPTIONS)
+    looks = [look for one in found.sets for look in one.seen.values()]
+    before = [look for look in looks if look.t_ns < begun_ns[1]]
+    assert before and all(look.doubt is not None for look in before)
+    assert Doubt.GAP in {look.doubt for look in before}
+    alone = {one.parameters.origin.device: one for one in recover_sets(parts[0], DESCRIPTIONS).sets}
+    for one in found.sets:
+        for address, look in one.seen.items():
+            if look.t_ns < begun_ns[1]:
+                assert one.parameters.values[address] == alone[one.parameters.origin.device].parameters.values[address]
+
+
+def test_recordings_one_after_another_are_one_story_with_a_gap(tmp_path: Path) -> None:
+    (tmp_path / "a").mkdir()
+    (tmp_path / "b").mkdir()
+    (first,) = in_parts(tmp_path / "a", cut_s=3600)
+    (second,) = in_parts(tmp_path / "b", cut_s=3600, later_ns=24 * 3600 * 10**9)
+    found = recover_sets([second, first], DESCRIPTIONS)
+    alone = recover_sets(second, DESCRIPTIONS)
+    assert [one.seen for one in found.sets] == [one.seen for one in alone.sets], "the same was seen again, later"
+    assert [one.parameters.values for one in found.sets] == [one.parameters.values for one in alone.sets]
+
+
+def test_files_that_are_no_series_are_refused_with_their_name(tmp_path: Path) -> None:
+    (tmp_path / "other").mkdir()
+    (whole,) = in_parts(tmp_path, cut_s=3600)
+    other = in_parts(tmp_path / "other", cut_s=3600, later_ns=24 * 3600 * 10**9, turbine="wtg-99")
+    with pytest.raises(RecordingError, match="at the same time"):
+        recover_sets([VISIT, whole], DESCRIPTIONS)
+    with pytest.raises(RecordingError, match="at the same time"):
+        recover_sets([VISIT, VISIT], DESCRIPTIONS)
+    with pytest.raises(RecordingError, match="other turbine"):
+        recover_sets([VISIT, *other], DESCRIPTIONS)
+    with pytest.raises(RecordingError, match=r"none\.mcap"):
+        recover_sets([VISIT, tmp_path / "none.mcap"], DESCRIPTIONS)
 
 
 async def test_a_recorded_first_look_gives_the_very_values_that_were_kept_as_found(
