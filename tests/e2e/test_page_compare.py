@@ -208,6 +208,24 @@ def test_a_file_is_put_into_a_column_and_a_bad_column_can_be_taken_out(home: Hom
     expect(cell(page, "3110:01", 1)).to_contain_text("50.0 °C")
 
 
+def test_a_finding_is_new_beside_the_reference_or_stands_in_it(home: Home) -> None:
+    """What the rules say of a column is held against the first one, which another column can become."""
+    one, two = "live:wtg-07/blade-1/pmc", "live:wtg-07/blade-2/pmc"
+    home.write("wtg-07/blade-2/pmc", "6510:04", 410)
+    try:
+        page = home.page
+        home.go(f"tab=compare&columns={one},{two}&edit=6510:04")
+        standing = page.get_by_test_id("standing-6510:04!oat.dc_link_ladder")
+        expect(standing).to_have_text("New in Blade 2 PMC now (RAM)")
+        expect(page.get_by_test_id("compared-6510:04")).to_contain_text(re.compile(r"findings?new"))
+        home.go(f"tab=compare&columns={two},{one}&edit=6510:04")
+        expect(standing).to_have_text("In the reference alone")
+        home.go("tab=blades&device=wtg-07/blade-1/pmc&edit=6510:04")
+        expect(standing).to_have_text("In Blade 2 PMC")
+    finally:
+        home.write("wtg-07/blade-2/pmc", "6510:04", 100)
+
+
 def test_the_odd_blade_is_named_and_followed_live(home: Home) -> None:
     page = home.page
     home.go("tab=blades")
@@ -290,3 +308,21 @@ def test_many_columns_and_all_rows_stay_small_in_the_document(home: Home) -> Non
     last = page.get_by_test_id("comparison").get_attribute("aria-rowcount")
     expect(page.locator(f"[aria-rowindex='{last}']")).to_be_visible()
     assert rows.count() <= MOST_ROWS
+
+
+def test_the_blades_are_compared_by_their_latest_sets_connected_or_not(home: Home) -> None:
+    """The sets as found are older than what was written to blade 2: by them the blades agree."""
+    page = home.page
+    home.go(f"tab=blades&device={ONE}")
+    page.get_by_test_id("parity-of").get_by_text("Latest sets").click()
+    expect(page).to_have_url(re.compile("of=latest"))
+    expect(page.get_by_test_id(f"parity-{TWO}")).to_contain_text("agrees with the others")
+    head = page.get_by_test_id(f"head-latest:{TWO}")
+    expect(head).to_contain_text(re.compile(r"latest set.*\d{4}-\d\d-\d\d \d\d:\d\d"))
+    home.ask("POST", "/api/live/disconnect", {})
+    try:
+        home.go("tab=blades")
+        expect(page.get_by_test_id(f"parity-{ONE}")).to_contain_text("agrees with the others")
+        expect(page.get_by_test_id("parity-of")).to_have_count(0)
+    finally:
+        home.ask("POST", "/api/live/connect", {"turbine": "wtg-07"})

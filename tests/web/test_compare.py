@@ -85,6 +85,32 @@ async def test_blades_stand_side_by_side_and_what_is_bound_to_one_is_set_apart(s
     assert all(len(row["cells"]) == 3 for part in doc["parts"] for row in part["comparison"]["rows"])
 
 
+async def test_blades_of_a_turbine_that_is_not_connected_are_compared_by_their_latest_sets(server: Server) -> None:
+    """A later fragment takes no complete set's place; a blade of which nothing is kept is named."""
+    sets, day_ns = [], 24 * 3600 * 10**9
+    for blade, limit, charge in ((1, 500, 5), (2, 510, 6)):
+        target = server.connection.target(f"wtg-07/blade-{blade}/pmm")
+        known = as_known(target, "wtg-07", "tester", 30 * day_ns)
+        values = {**known.values, parse_address("3110:01"): limit, parse_address("3050"): charge}
+        whole = replace(known, values=values, unread={})
+        fragment = replace(whole, values={}, unread=dict.fromkeys(values, "no answer"))
+        later = replace(fragment, origin=replace(whole.origin, time="1970-02-20T00:00:00Z"))
+        sets += [whole, later]
+    await server.bench.office.library.put(sets, Source.BACKUP)
+    assert (await server.client.post("/api/live/disconnect", json={})).is_success
+    address = "/api/parity?turbine=wtg-07&kind"
+    (part,) = (await server.client.get(f"{address}=latest")).json()["parts"]
+    assert (part["description_id"], part["blades"], part["without"]) == ("oat-pmm", [1, 2], [3])
+    told = [(one["spec"], one["t_ns"], one["complete"]) for one in part["comparison"]["columns"]]
+    assert told == [(f"latest:wtg-07/blade-{blade}/pmm", 30 * day_ns, True) for blade in (1, 2)]
+    assert row(part["comparison"], "3110:01")["state"] == "different"
+    assert row(part["comparison"], "3050")["state"] == "unit"
+    assert part["comparison"]["summary"]["different"] == 1
+    assert (await server.client.get(f"{address}=live")).json()["parts"] == []
+    missing = await server.client.post("/api/compare", json={"columns": [f"latest:{PMC}", f"default:{PMC}"]})
+    assert missing.json()["details"]["reason_key"] == "compare.unresolved.no-latest"
+
+
 async def test_a_rule_that_a_column_breaks_is_told_at_its_row(server: Server) -> None:
     """The DC link's minimum must stay below its maximum: what is pending would break that."""
     highest = row(await compared(server, f"live:{PMM}", f"live:{PMM}"), "30FA:02")["cells"][0]["raw"]

@@ -94,6 +94,8 @@ class Columns:
                 return await self._kept(spec)
             case ColumnKind.YEAR:
                 return await self._year(spec)
+            case ColumnKind.LATEST:
+                return await self._latest(spec)
             case ColumnKind.GOLDEN | ColumnKind.DELIVERED | ColumnKind.FOUND | ColumnKind.LEFT:
                 return await self._tagged(spec)
 
@@ -231,6 +233,13 @@ class Columns:
             raise Unresolved.NO_YEAR.error(str(spec))
         best = min(old, key=lambda one: (not one.complete, abs(now_ns - one.t_ns - YEAR_NS)))
         return await self._of_record(spec, best)
+
+    async def _latest(self, spec: ColumnSpec) -> Shown:
+        """The newest record; a fragment only where no set is complete."""
+        records = await self._library(spec).records(Filter(device=spec.of))
+        if not records:
+            raise Unresolved.NO_LATEST.error(str(spec))
+        return await self._of_record(spec, max(records, key=lambda one: (one.complete, one.t_ns)))
 
 
 def _is_twin(name: Raw | None) -> bool | None:

@@ -14,7 +14,7 @@ class ColumnKind(Enum):
     ``LIVE``: RAM now. ``STORED``: non-volatile memory as far as it is known. ``EDITOR``: RAM with changes that are not
     written yet. ``DEFAULT``: of the description. ``SET``: a record of the library. ``FILE``: a set file. ``GOLDEN``:
     the model set of the device's kind. ``DELIVERED``: as delivered. ``FOUND``, ``LEFT``: of the last visit that kept
-    values. ``YEAR``: about a year ago.
+    values. ``YEAR``: about a year ago. ``LATEST``: the newest set that is kept, a complete one where there is one.
     """
 
     LIVE = "live"
@@ -28,6 +28,7 @@ class ColumnKind(Enum):
     FOUND = "found"
     LEFT = "left"
     YEAR = "year"
+    LATEST = "latest"
 
     @property
     def of_device(self) -> bool:
@@ -46,6 +47,7 @@ class Unresolved(Enum):
     NO_DELIVERED = "no-delivered"
     NO_VISIT = "no-visit"
     NO_YEAR = "no-year"
+    NO_LATEST = "no-latest"
     NO_DESCRIPTION = "no-description"
     NO_OBJECT = "no-object"
     NOT_HERE = "not-here"

@@ -56,7 +56,7 @@ async def export_comparison(
 async def parity(
     bench: BenchOf,
     turbine: Annotated[str | None, Query(max_length=200, description="Slug; the connected one where not given")] = None,
-    kind: Literal["live", "stored", "found", "left", "delivered"] = "live",
+    kind: Literal["live", "stored", "found", "left", "delivered", "latest"] = "live",
     everything: Annotated[bool, Query(alias="all")] = False,
 ) -> ParityDoc:
     """The blades of a turbine side by side, each kind of device by itself."""

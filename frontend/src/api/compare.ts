@@ -11,6 +11,8 @@ export type ColumnDoc = Schemas["ColumnDoc"];
 export type RowDoc = Schemas["CompareRow"];
 export type CellDoc = Schemas["CellDoc"];
 export type BitLine = Schemas["BitDoc"];
+export type ParityDoc = Schemas["ParityDoc"];
+export type ParityPart = ParityDoc["parts"][number];
 export type RowState = RowDoc["state"];
 export type CellState = CellDoc["state"];
 
@@ -31,6 +33,16 @@ export const compareQuery = (columns: readonly string[], pending: Pending, live:
     staleTime: 0,
     refetchInterval: (query) => (live && query.state.status === "success" ? LIVE_MS : false),
     placeholderData: keepPreviousData,
+  });
+
+/** The blades of a turbine by the newest set that is kept of each. */
+export const parityQuery = (turbine: string | undefined) =>
+  queryOptions({
+    queryKey: ["parity", turbine],
+    queryFn: ({ signal }) =>
+      get<ParityDoc>(`/api/parity?kind=latest&turbine=${encodeURIComponent(turbine ?? "")}`, signal),
+    enabled: turbine !== undefined,
+    staleTime: 0,
   });
 
 export type ExportFormat = "html" | "csv";

@@ -2465,7 +2465,7 @@ export interface components {
              * Kind
              * @enum {string}
              */
-            kind: "live" | "stored" | "editor" | "default" | "set" | "file" | "golden" | "delivered" | "found" | "left" | "year";
+            kind: "live" | "stored" | "editor" | "default" | "set" | "file" | "golden" | "delivered" | "found" | "left" | "year" | "latest";
             /** Person */
             person: string;
             /** Reason */
@@ -10512,7 +10512,7 @@ export interface operations {
             query?: {
                 /** @description Slug; the connected one where not given */
                 turbine?: string | null;
-                kind?: "live" | "stored" | "found" | "left" | "delivered";
+                kind?: "live" | "stored" | "found" | "left" | "delivered" | "latest";
                 all?: boolean;
             };
             header?: never;

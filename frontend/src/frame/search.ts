@@ -76,6 +76,9 @@ export interface PageSearch {
   columns?: string;
   rows?: string;
   group?: string;
+  /** The turbine whose blades are compared, where it is not the connected one, and of when: "latest" or now. */
+  turbine?: string;
+  of?: "latest";
   /** The golden set of the fleet, the station that is restored, and the sets that are restored there. */
   golden?: string;
   station?: string;
@@ -124,6 +127,7 @@ const TEXTS = [
   "columns",
   "rows",
   "group",
+  "turbine",
   "golden",
   "station",
   "sets",
@@ -169,6 +173,7 @@ export function readSearch(raw: Record<string, unknown>): PageSearch {
   if (raw.view === "side") search.view = raw.view;
   if (raw.review === "open") search.review = raw.review;
   if (raw.findings === "open") search.findings = raw.findings;
+  if (raw.of === "latest") search.of = raw.of;
   for (const name of TEXTS) {
     const text = raw[name];
     if (typeof text === "string" && text !== "") search[name] = text;

@@ -27,6 +27,8 @@ const NO_TAB = {
   columns: undefined,
   rows: undefined,
   group: undefined,
+  turbine: undefined,
+  of: undefined,
   golden: undefined,
   station: undefined,
   sets: undefined,

@@ -9,6 +9,7 @@ import { FindingText, SeveritySign, useSeverity } from "./FindingText";
 import type { CompareLine, RowLine, SectionLine } from "./lines";
 import { Against, cellMarks, Mark } from "./marks";
 import { ClassChip, RowSign } from "./signs";
+import { Standing, standingOf } from "./standing";
 
 export interface RowActions {
   onFold: (section: string, open: boolean) => void;
@@ -67,7 +68,7 @@ export const CompareRow = memo(function CompareRow(props: Props) {
         "data-testid": `compared-${line.id}`,
       });
     case "finding":
-      return inTable(3, <FindingText rule={line.rule} />);
+      return inTable(3, <FindingText line={line} columns={props.columns} against={props.against} />);
     case "bit":
       return inTable(
         3,
@@ -145,7 +146,7 @@ function Entry({ line, columns, against, picked, actions }: Props & { line: RowL
         </button>
       </div>
       <div role="gridcell" className={classes.matters}>
-        <Weight line={line} />
+        <Weight line={line} against={against} />
       </div>
       {row.cells.map((cell, at) => {
         const column = columns[at];
@@ -165,11 +166,14 @@ function Entry({ line, columns, against, picked, actions }: Props & { line: RowL
 }
 
 /** Whether it matters: what a restore makes of it, and what the rules say. */
-function Weight({ line }: { line: RowLine }) {
+function Weight({ line, against }: { line: RowLine; against: Against }) {
   const t = useTexts();
   const { row } = line.compared;
   const count = row.findings.length;
   const severity = useSeverity(row.findings);
+  const isNew = row.findings.some(
+    (rule) => standingOf(row.found_in[rule] ?? [], row.cells.length, against) === Standing.New,
+  );
   return (
     <>
       <ClassChip restore={row.restore} />
@@ -180,6 +184,7 @@ function Weight({ line }: { line: RowLine }) {
         >
           <SeveritySign severity={severity} />
           {t(count === 1 ? "page.compare.finding" : "page.compare.findings", { count })}
+          {isNew && <span className={classes.fresh}>{t("page.compare.new")}</span>}
         </span>
       )}
     </>

@@ -18,7 +18,13 @@ const record = (device: string, tags: string[], daysAgo: number) =>
 
 it("knows what of a device is kept: tags by device, golden by kind, a year ago by age", () => {
   const kept = keptOf([record("w/b1/pmc", ["as-found", "golden"], 200), record("w/b2/pmc", [], 100)], NOW_MS);
-  expect([...kept]).toEqual(["found w/b1/pmc", "golden oat-pmc", "year w/b1/pmc"]);
+  expect([...kept]).toEqual([
+    "found w/b1/pmc",
+    "golden oat-pmc",
+    "latest w/b1/pmc",
+    "year w/b1/pmc",
+    "latest w/b2/pmc",
+  ]);
   const absent = deviceChoices(DEVICES, null, kept, WORDS).filter((one) => one.absent);
   expect(absent.map((one) => one.column)).toEqual([
     "left:w/b1/pmc",

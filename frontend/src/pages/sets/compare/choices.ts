@@ -23,7 +23,14 @@ export interface DeviceChoice {
 export type Kept = ReadonlySet<string>;
 
 const OF_CONNECTED = [Source.Live, Source.Stored, Source.Editor, Source.Default] as const;
-const OF_KEPT = [Source.Found, Source.Left, Source.Delivered, Source.Golden, Source.Year] as const;
+const OF_KEPT = [
+  Source.Found,
+  Source.Left,
+  Source.Delivered,
+  Source.Golden,
+  Source.Latest,
+  Source.Year,
+] as const;
 const TAGGED = {
   "as-found": Source.Found,
   "as-left": Source.Left,
@@ -40,6 +47,7 @@ export function keptOf(records: readonly SetRecord[], nowMs: number): Kept {
   for (const { tags, origin, description_id, t_ns } of records) {
     for (const { tag } of tags)
       kept.add(`${TAGGED[tag]} ${tag === "golden" ? description_id : origin.device}`);
+    kept.add(`${Source.Latest} ${origin.device}`);
     if (nowMs - t_ns / 1e6 >= YEAR_LEAST_MS) kept.add(`${Source.Year} ${origin.device}`);
   }
   return kept;

@@ -3,7 +3,16 @@ import type { BitLine, RowDoc, RowState } from "../../../api/compare";
 import { ALLOWED, type ComparedRow, keptRows, linesOf, Rows, shownBits, type View } from "./lines";
 
 const row = (address: string, group: string, state: RowState, more: Partial<RowDoc> = {}): ComparedRow => {
-  const doc = { address, group, state, bits: [], findings: [], cells: [], ...more } as unknown as RowDoc;
+  const doc = {
+    address,
+    group,
+    state,
+    bits: [],
+    findings: [],
+    found_in: {},
+    cells: [],
+    ...more,
+  } as unknown as RowDoc;
   return {
     row: doc,
     known: null,
@@ -51,8 +60,9 @@ it("narrows by words and by group, and hides the rows of what is closed", () => 
 
 it("unfolds a row into its findings, the bits that say something, and its raw values", () => {
   const bits = [bit([1, 1], false), bit([0, 0], false), bit([0, 1], true), bit([null, 0], false)];
-  const mask = row("9", "a", "different", { bits, findings: ["oat.rule"] });
+  const mask = row("9", "a", "different", { bits, findings: ["oat.rule"], found_in: { "oat.rule": [1] } });
   expect(shownBits(mask.row)).toEqual([bits[0], bits[2]]);
   const lines = linesOf([mask], { ...VIEW, expanded: new Set(["9"]) });
   expect(lines.map((line) => line.kind)).toEqual(["section", "row", "finding", "bit", "bit", "facts"]);
+  expect(lines[2]).toMatchObject({ rule: "oat.rule", broken: [1] });
 });

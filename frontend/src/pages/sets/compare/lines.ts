@@ -38,6 +38,8 @@ export interface FindingLine {
   kind: "finding";
   id: string;
   rule: string;
+  /** The columns in which it is broken. */
+  broken: readonly number[];
 }
 export interface FactsLine {
   kind: "facts";
@@ -109,11 +111,18 @@ function rowLines(compared: ComparedRow, expandedRows: ReadonlySet<string>, allo
   if (!expanded) return [head];
   return [
     head,
-    ...row.findings.map((rule): FindingLine => ({ kind: "finding", id: `${row.address}!${rule}`, rule })),
+    ...row.findings.map((rule) => findingLine(row, rule)),
     ...shownBits(row).map((bit, at): BitRow => ({ kind: "bit", id: `${row.address}#${at}`, bit, compared })),
     { kind: "facts", id: `${row.address}?`, compared },
   ];
 }
+
+const findingLine = (row: RowDoc, rule: string): FindingLine => ({
+  kind: "finding",
+  id: `${row.address}!${rule}`,
+  rule,
+  broken: row.found_in[rule] ?? [],
+});
 
 /** Bits that are set anywhere or differ: the others of a mask of 32 say nothing. */
 export const shownBits = (row: RowDoc): BitLine[] =>

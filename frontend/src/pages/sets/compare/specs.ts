@@ -12,6 +12,7 @@ export enum Source {
   Found = "found",
   Left = "left",
   Year = "year",
+  Latest = "latest",
   Set = "set",
 }
 

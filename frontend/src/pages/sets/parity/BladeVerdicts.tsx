@@ -1,4 +1,4 @@
-import { IconCircleCheck, IconEqualNot } from "@tabler/icons-react";
+import { IconCircleCheck, IconEqualNot, IconFileOff } from "@tabler/icons-react";
 import { useTexts } from "../../../texts/texts";
 import type { Compared } from "../compare/compared";
 import { useColumnTitle } from "../compare/titles";
@@ -7,7 +7,8 @@ import classes from "./Parity.module.css";
 import { type BladeVerdict, verdictsOf } from "./verdicts";
 
 /** The sentence that sums up, and for each blade whether it is the odd one. */
-export function BladeVerdicts({ compared }: { compared: Compared }) {
+export function BladeVerdicts({ compared, without }: { compared: Compared; without: readonly number[] }) {
+  const t = useTexts();
   const { columns, rows, summary } = compared.doc;
   return (
     <>
@@ -15,6 +16,13 @@ export function BladeVerdicts({ compared }: { compared: Compared }) {
       <ul className={classes.blades}>
         {verdictsOf(columns, rows).map((verdict) => (
           <Blade key={verdict.column.spec} verdict={verdict} />
+        ))}
+        {without.map((blade) => (
+          <li key={blade} data-odd data-testid={`parity-without-${blade}`}>
+            <IconFileOff size={20} className="tone-warning" aria-hidden />
+            <strong>{t("page.blade", { blade })}</strong>
+            <span>{t("page.parity.without")}</span>
+          </li>
         ))}
       </ul>
     </>

@@ -1,62 +1,58 @@
-import { SegmentedControl } from "@mantine/core";
-import { useQuery } from "@tanstack/react-query";
-import { useMemo } from "react";
-import { LEAST_COLUMNS } from "../../../api/compare";
-import { turbineQuery } from "../../../api/queries";
-import { usePageSearch } from "../../../frame/search";
+import { Loader } from "@mantine/core";
 import { Unconnected } from "../../../frame/Unconnected";
+import { usePageSearch } from "../../../frame/search";
 import { useTexts } from "../../../texts/texts";
-import { placesOf } from "../../../ui/devices";
+import { ProblemAlert } from "../../../ui/ProblemAlert";
 import room from "../../../ui/Room.module.css";
-import { type Kind, kindsOf } from "../../parameters/selection";
 import { Comparison } from "../compare/Comparison";
 import { Against } from "../compare/marks";
-import { ofDevice, Source } from "../compare/specs";
+import { Source } from "../compare/specs";
 import { BladeVerdicts } from "./BladeVerdicts";
+import { Chooser } from "./Chooser";
+import classes from "./Parity.module.css";
+import { useParity } from "./useParity";
 
-const LABEL = { minHeight: 40, display: "flex", alignItems: "center", justifyContent: "center" };
-
-/** The blades of the connected turbine side by side, live: they should be alike but for what is bound to one unit. */
+/**
+ * The blades of a turbine side by side, as they are now or by their latest sets: they should be alike but for what is
+ * bound to one unit.
+ */
 export function ParityTab() {
   const t = useTexts();
   const [search] = usePageSearch();
-  const turbine = useQuery(turbineQuery);
-  const kinds = useMemo(
-    () => kindsOf(placesOf(turbine.data)).filter((kind) => kind.places.length >= LEAST_COLUMNS),
-    [turbine.data],
-  );
+  const parity = useParity();
+  const { kinds, turbine, settled, error } = parity;
   const kind =
-    kinds.find((one) => one.places.some((place) => place.device.slug === search.device)) ?? kinds[0];
-  if (turbine.isSuccess && !turbine.data) return <Unconnected />;
-  if (!kind) return turbine.isSuccess ? <p className={room.note}>{t("page.parity.alone")}</p> : null;
+    kinds.find((one) => search.device !== undefined && one.devices.includes(search.device)) ?? kinds[0];
+  if (!settled) return <Loader aria-label={t("page.loading")} />;
+  if (parity.turbines.length === 0 && turbine === undefined) return <Unconnected />;
+  if (!kind)
+    return (
+      <>
+        <div className={classes.bar}>
+          <Chooser parity={parity} />
+        </div>
+        {error === null || error === undefined ? (
+          <p className={room.note} data-testid="parity-none">
+            {t(noneKey(parity))}
+          </p>
+        ) : (
+          <ProblemAlert error={error} title={t("page.compare.failed")} />
+        )}
+      </>
+    );
   return (
     <Comparison
-      key={kind.descriptionId}
+      key={`${turbine ?? ""} ${parity.source} ${kind.descriptionId}`}
       label={t("page.sets.tab.blades")}
-      columns={kind.places.map((place) => ofDevice(Source.Live, place.device.slug))}
+      columns={kind.columns}
       against={Against.Majority}
-      chooser={() => <KindPicker kinds={kinds} kind={kind} />}
-      verdict={(compared) => <BladeVerdicts compared={compared} />}
+      chooser={() => <Chooser parity={parity} kind={kind} />}
+      verdict={(compared) => <BladeVerdicts compared={compared} without={kind.without} />}
     />
   );
 }
 
-function KindPicker({ kinds, kind }: { kinds: readonly Kind[]; kind: Kind }) {
-  const t = useTexts();
-  const [, update] = usePageSearch();
-  const pick = (id: string) => {
-    const next = kinds.find((one) => one.descriptionId === id);
-    update({ device: next?.places[0]?.device.slug, group: undefined, edit: undefined });
-  };
-  return (
-    <SegmentedControl
-      aria-label={t("page.device.kind")}
-      size="sm"
-      styles={{ label: LABEL }}
-      data={kinds.map((one) => ({ value: one.descriptionId, label: one.name }))}
-      value={kind.descriptionId}
-      onChange={pick}
-      data-testid="parity-kind"
-    />
-  );
+function noneKey({ turbine, source }: ReturnType<typeof useParity>): string {
+  if (turbine === undefined) return "page.parity.choose";
+  return source === Source.Latest ? "page.parity.no_sets" : "page.parity.alone";
 }
