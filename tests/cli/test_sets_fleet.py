@@ -102,7 +102,7 @@ def test_the_table_for_people_shows_those_that_stand_out(sets: Sets, tmp_path: P
     assert code == 0
     lines = out.splitlines()
     assert lines[0].startswith("wtg-01/blade-1/pmm, golden set: 2026-05-01 08:00 UTC")
-    assert lines[1] == "4 devices of 3 turbines compared: 2 as the golden set; 0 not comparable"
+    assert lines[1] == "Devices compared: 4 (turbines: 3); as the golden set: 2; not comparable: 0"
     rows = [line.split() for line in lines if line[:1].isdigit() and "/blade" in line]
     assert [row[:6] for row in rows] == [
         ["1", "wtg-02/blade-1/pmm", "2026-05-02", "2", "0", "0"],
