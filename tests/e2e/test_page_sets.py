@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import re
 from collections.abc import Iterator
@@ -18,6 +19,8 @@ WAIT_MS = 60_000
 expect.set_options(timeout=20_000)
 WRITE = """async (body) => (await fetch("/api/live/devices/wtg-07/blade-1/pmm/write",
     { method: "POST", headers: { "content-type": "application/json" }, body: JSON.stringify(body) })).status"""
+IMPORT = """async (body) => (await (await fetch("/api/sets/import", { method: "POST",
+    headers: { "content-type": "application/json" }, body: JSON.stringify(body) })).json()).record.id"""
 FOREIGN = "address,name,raw\n6065,window,1234\n2FFF,of another maker,1\n"
 
 
@@ -101,6 +104,7 @@ def test_a_set_leaves_as_a_file_and_comes_back_and_errors_name_the_line(home: tu
     page.goto(f"{address}sets?scene=off&find=before+the+test")
     backup_of(page, "blade-1 / pmc").click()
     page.get_by_test_id("export-set").click()
+    expect(page.get_by_test_id("export-dcf")).to_be_visible()
     with page.expect_download() as download:
         page.get_by_test_id("export-json").click()
     target = tmp_path / "set.json"
@@ -129,6 +133,18 @@ def test_a_set_leaves_as_a_file_and_comes_back_and_errors_name_the_line(home: tu
     details.get_by_test_id("set-unread").locator("summary").click()
     expect(details.get_by_test_id("set-unread")).to_contain_text("not in the file")
     expect(rows(page).filter(has_text="wtg-09")).to_have_count(1)
+
+
+def test_a_dcf_is_offered_of_canopen_devices_alone(home: tuple[str, Page]) -> None:
+    address, page = home
+    page.goto(f"{address}sets?scene=off")
+    data = base64.b64encode(b"address,name,raw\n2030,,1\n").decode()
+    servo = {"name": "servo.csv", "data": data, "device": "wtg-09/hub/servo", "description_id": "nanotec-pd4e"}
+    opened = page.evaluate(IMPORT, servo)
+    page.goto(f"{address}sets?scene=off&file={opened}")
+    page.get_by_test_id("export-set").click()
+    expect(page.get_by_test_id("export-csv")).to_be_visible()
+    expect(page.get_by_test_id("export-dcf")).to_have_count(0)
 
 
 def test_a_nameplate_is_typed_twice(home: tuple[str, Page]) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,9 @@ import pytest
 from app.model.set_record import Source
 from app.service.backup import read_device, to_set
 from app.service.connection import Connection
+from app.store import restore_rows as rows
 from app.store.audit_rows import Filter
+from app.store.restore_rows import RestoreState
 from app.store.store import Store
 from tests.service.restore.conftest import changed, served
 from tests.web.rig import DEADLINE_S, Server, running
@@ -141,6 +144,26 @@ async def test_stop_and_feather_pass_an_incomplete_restore_and_motion_does_not(s
     await post(server, f"/api/live/restores/{doc['id']}/resume")
     doc = await until(server, doc["id"], "done", "rolled-back", "incomplete")
     assert doc["end"] == "new", doc["cause_key"]
+
+
+async def test_what_is_open_is_listed_however_much_came_after_it(server: Server) -> None:
+    doc = await begun(server)
+    await until(server, doc["id"], "awaiting-confirmation")
+    store = server.bench.office.store
+    (row,) = await store.run(rows.open_restores)
+    later = replace(row, id=NOBODY, state=RestoreState.DONE, started_ns=row.started_ns + 1)
+    await store.run(lambda kept: rows.add_restore(kept, later, []))
+    listed = "/api/live/restores?limit=1"
+    assert [one["id"] for one in (await server.client.get(listed)).json()] == [NOBODY]
+    (found,) = (await server.client.get(f"{listed}&open=true")).json()
+    assert (found["id"], found["state"]) == (doc["id"], "awaiting-confirmation")
+    assert (await server.client.get(f"{listed}&open=true&turbine=wtg-08")).json() == []
+    await server.bench.restores.close()
+    (found,) = (await server.client.get(f"{listed}&open=true")).json()
+    assert (found["id"], found["end"]) == (doc["id"], "incomplete")
+    await post(server, f"/api/live/restores/{doc['id']}/roll-back")
+    await until(server, doc["id"], "rolled-back")
+    assert (await server.client.get(f"{listed}&open=true")).json() == []
 
 
 async def test_what_is_refused_is_refused_with_reasons(server: Server) -> None:

@@ -14,6 +14,7 @@ from app.service.compare.ground import ground_of
 from app.service.compare.parity import compare_blades
 from app.service.compare.sources import Columns
 from app.service.compare.spec import ColumnKind, ColumnSpec
+from app.web.attachment import as_attachment
 from app.web.deps import BenchOf
 from app.web.models.compare import CompareRequest, ComparisonDoc
 from app.web.models.fleet import FleetDoc, FleetRequest, ParityDoc, ParityPart
@@ -43,13 +44,12 @@ async def export_comparison(
     pending = columns.read_pending(request.pending)
     compared = await compare_columns(columns, request.columns, pending, request.all)
     texts = texts_for(asked.headers.get("accept-language"), asked.app.state.language)
-    name = f'attachment; filename="comparison.{file_format}"'
     if file_format == "csv":
         # With a byte order mark: without one, spreadsheets take UTF-8 for an old code page.
         content, kind = to_csv(compared, texts, same).encode("utf-8-sig"), "text/csv; charset=utf-8"
     else:
         content, kind = to_html(compared, texts, same).encode(), "text/html; charset=utf-8"
-    return Response(content, media_type=kind, headers={"Content-Disposition": name})
+    return Response(content, media_type=kind, headers=as_attachment(f"comparison.{file_format}"))
 
 
 @router.get("/parity")

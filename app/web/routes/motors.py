@@ -14,6 +14,7 @@ from app.model.od_export import description_dict, entry_dict
 from app.model.roles import Role
 from app.service.bench import Bench
 from app.service.motors import description, live_motor
+from app.web.attachment import as_attachment
 from app.web.deps import DEVICE, BenchOf, ConnectionOf, PersonOf, TargetOf, needs
 from app.web.models import Nothing
 from app.web.models.motors import (
@@ -65,7 +66,7 @@ async def export_motors(
 ) -> Response:
     """Motors as CSV: those named, else all but the examples."""
     text = await bench.office.motors.export(ids)
-    headers = {"content-disposition": 'attachment; filename="hubside-motors.csv"'}
+    headers = as_attachment("hubside-motors.csv")
     return Response(text.encode(), media_type="text/csv; charset=utf-8", headers=headers)
 
 

@@ -13,6 +13,7 @@ from fastapi.responses import FileResponse, StreamingResponse
 from app.service import recording_list
 from app.service.bench import Bench
 from app.service.recording_list import FileState, Look, RecordingFile, Recordings, Summary
+from app.web.attachment import as_attachment
 from app.web.deps import BenchOf
 from app.web.models.recordings import (
     AttachmentRef,
@@ -86,9 +87,9 @@ async def download_recording(bench: BenchOf, all_of_them: RecordingsOf, name: st
     """The file; of the one that is being written what it holds now."""
     path = _known(all_of_them, name)
     if not _is_live(bench, path):
-        return FileResponse(path, media_type=MCAP, filename=path.name)
+        return FileResponse(path, media_type=MCAP, headers=as_attachment(path.name))
     size = path.stat().st_size
-    headers = {"Content-Disposition": f'attachment; filename="{path.name}"', "Content-Length": str(size)}
+    headers = {**as_attachment(path.name), "Content-Length": str(size)}
     return StreamingResponse(_first_bytes(path, size), media_type=MCAP, headers=headers)
 
 
@@ -99,9 +100,7 @@ async def download_attachment(all_of_them: RecordingsOf, name: str, attachment: 
     found = await asyncio.to_thread(recording_list.attachment, path, attachment)
     if found is None:
         raise NotFoundError(what=attachment)
-    file_name = attachment.replace("/", "_").replace('"', "")
-    headers = {"Content-Disposition": f'attachment; filename="{file_name}"'}
-    return Response(found.data, media_type=found.media_type, headers=headers)
+    return Response(found.data, media_type=found.media_type, headers=as_attachment(attachment))
 
 
 def _known(all_of_them: Recordings, name: str) -> Path:

@@ -18,6 +18,7 @@ from app.service.restore.assign import assign
 from app.service.restore.motor_given import given_motor, is_motor
 from app.service.restore.order import Given, Order
 from app.service.restore.survey import targets_of
+from app.web.attachment import as_attachment
 from app.web.deps import BenchOf, ConnectionOf, PersonOf, needs
 from app.web.models import Nothing
 from app.web.models.restore import RestoreDoc, RestoreHead, RestorePlanDoc, RestorePlanRequest, RestoreRequest
@@ -53,9 +54,13 @@ async def restores(
     bench: BenchOf,
     turbine: Annotated[str | None, Query(max_length=200)] = None,
     limit: Annotated[int, Query(ge=1, le=500)] = 100,
+    only_open: Annotated[bool, Query(alias="open", description="Those that have not ended, however old")] = False,
 ) -> list[RestoreHead]:
     """Restores, newest first; of one turbine where named."""
-    return [head_doc(row) for row in await bench.restores.latest(turbine, limit)]
+    if not only_open:
+        return [head_doc(row) for row in await bench.restores.latest(turbine, limit)]
+    rows = [(await bench.restores.get(row.id)).row for row in reversed(bench.restores.open)]
+    return [head_doc(row) for row in rows if turbine in (None, row.turbine) and not row.state.ended]
 
 
 @router.get("/live/restores/{restore_id}")
@@ -100,8 +105,7 @@ async def record_file(
     else:
         make = html_file if form == "html" else pdf_file
         content = await asyncio.to_thread(make, sealed, locale, key)
-    name = f'attachment; filename="restore-{restore_id}.{form}"'
-    return Response(content, media_type=_MEDIA[form], headers={"Content-Disposition": name})
+    return Response(content, media_type=_MEDIA[form], headers=as_attachment(f"restore-{restore_id}.{form}"))
 
 
 async def _order(bench: Bench, connection: Connection, person: SignedIn, request: RestorePlanRequest) -> Order:

@@ -30,6 +30,7 @@ from app.service.library.folder import Looked, SetFolder
 from app.service.library.recovered import recover_sets
 from app.service.views import raw_to_json
 from app.store.set_rows import Filter
+from app.web.attachment import as_attachment
 from app.web.deps import BenchOf, ConnectionOf, JobsOf, Needs, PersonOf, needs
 from app.web.models import JobDoc
 from app.web.models.sets import (
@@ -132,8 +133,7 @@ async def download_set(bench: BenchOf, key: str, format: FormatName = "json") ->
     library = bench.office.library
     found = await library.set_of(await library.record(key))
     text, name, media = await asyncio.to_thread(_file, found, format, descriptions_of(bench))
-    headers = {"content-disposition": f'attachment; filename="{name}"'}
-    return Response(text.encode(), media_type=f"{media}; charset=utf-8", headers=headers)
+    return Response(text.encode(), media_type=f"{media}; charset=utf-8", headers=as_attachment(name))
 
 
 @router.post("/sets/{key}/tags", dependencies=[needs(Role.TECHNICIAN)])

@@ -8863,6 +8863,8 @@ export interface operations {
             query?: {
                 turbine?: string | null;
                 limit?: number;
+                /** @description Those that have not ended, however old */
+                open?: boolean;
             };
             header?: never;
             path?: never;

@@ -53,6 +53,14 @@ export const restoresQuery = queryOptions({
   refetchInterval: (query) => (query.state.data?.some(isOpen) ? WATCH_MS : IDLE_WATCH_MS),
 });
 
+/** Those alone that somebody must still look after, however many came after them. */
+export const openRestoresQuery = queryOptions({
+  queryKey: [...restoresQuery.queryKey, "open"],
+  queryFn: ({ signal }) => get<RestoreHead[]>("/api/live/restores?open=true", signal),
+  staleTime: 0,
+  refetchInterval: (query) => ((query.state.data?.length ?? 0) > 0 ? WATCH_MS : IDLE_WATCH_MS),
+});
+
 export const restoreQuery = (id: string) =>
   queryOptions({
     queryKey: ["restore", id],

@@ -122,6 +122,7 @@ export interface DescriptionDoc {
   version: string;
   name: string;
   vendor: string;
+  bus: "canopen" | "modbus-tcp" | "profibus-dp";
   manual: string;
   groups: { id: string; text_key: string }[];
   bit_tables: Record<string, BitDoc[]>;

@@ -4,7 +4,7 @@ import { useQuery } from "@tanstack/react-query";
 import { useNavigate } from "@tanstack/react-router";
 import { lazy, Suspense } from "react";
 import { turbineQuery } from "../api/queries";
-import { isOpen, type RestoreHead, restoresQuery } from "../api/restore";
+import { openRestoresQuery, type RestoreHead } from "../api/restore";
 import { useHearing } from "../live/live";
 import { useTexts } from "../texts/texts";
 import { stationName } from "../ui/devices";
@@ -25,7 +25,7 @@ const RUNNING = { Icon: IconLoader2, tone: "warning" };
 export function RestoreBanner() {
   const hearing = useHearing().state === "hearing";
   const [search] = usePageSearch();
-  const open = useQuery({ ...restoresQuery, enabled: hearing }).data?.filter(isOpen) ?? [];
+  const open = useQuery({ ...openRestoresQuery, enabled: hearing }).data ?? [];
   if (!hearing) return null;
   // The page of the restore itself says it all, and better.
   return open.filter((one) => one.id !== search.restore).map((one) => <Line key={one.id} restore={one} />);

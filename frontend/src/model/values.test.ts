@@ -44,6 +44,7 @@ const DOC: DescriptionDoc = {
   version: "1",
   name: "test",
   vendor: "",
+  bus: "canopen",
   manual: "",
   groups: [],
   bit_tables: {},

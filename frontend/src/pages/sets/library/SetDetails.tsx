@@ -44,8 +44,10 @@ export function SetDetails({ record }: { record: SetRecord }) {
 
 const FORMATS: readonly SetFormat[] = ["json", "dcf", "csv"];
 
+/** A DCF is of CANopen: for a device of another bus there is none. */
 function Export({ record }: { record: SetRecord }) {
   const t = useTexts();
+  const bus = useQuery(knownDescriptionQuery(record.description_id)).data?.bus;
   return (
     <Menu position="bottom-end" withinPortal>
       <Menu.Target>
@@ -59,7 +61,7 @@ function Export({ record }: { record: SetRecord }) {
         </Button>
       </Menu.Target>
       <Menu.Dropdown>
-        {FORMATS.filter((one) => one !== "dcf" || record.description_id.startsWith("oat-")).map((one) => (
+        {FORMATS.filter((one) => one !== "dcf" || bus === "canopen").map((one) => (
           <Menu.Item
             key={one}
             component="a"
