@@ -26,6 +26,7 @@ from app.errors import (
 from app.model.description import Description
 from app.model.description_file import load_builtin
 from app.model.set_record import SetRecord, Source
+from app.model.sets import Identity
 from app.service.connection import Connection
 from app.service.devices import Target
 from app.service.gate import OPEN, Blocks
@@ -137,8 +138,7 @@ class Desk:
     async def prepare(self, connection: Connection, order: Order, on_progress: Progress | None = None) -> Prepared:
         """Plan, and what speaks against it. Reads the devices and writes nothing."""
         self.require_idle()
-        plates = {slug: plate.serial for slug, plate in self._office.library.nameplates.items()}
-        return await prepare(connection, order, plates, on_progress)
+        return await prepare(connection, order, self._nameplates(), on_progress)
 
     async def begin(self, connection: Connection, prepared: Prepared, agreed: str | None = None) -> str:
         """Begin what was prepared just now; gives the id of the restore, which runs in the background.
@@ -163,7 +163,8 @@ class Desk:
         order = prepared.order
         restore_id = self._new_id()
         before = await self._keep(prepared.found, REASON_BEFORE, order.person, Source.UNDO)
-        details = detail.details_of(connection, prepared, {one.origin.device: one.id for one in before})
+        ids = {one.origin.device: one.id for one in before}
+        details = detail.details_of(connection, prepared, ids, self._nameplates())
         row = new_row(restore_id, connection.turbine.slug, order, details, self._stamp())
         values = value_rows(prepared.goals)
         await self._store.run(lambda kept: rows.add_restore(kept, row, values))
@@ -243,7 +244,9 @@ class Desk:
             station=kept.row.station,
             person=person,
             reason=REASON_AFTER,
-            serials={one["slug"]: one["identity"].get("serial") for one in details["devices"]},
+            identities={one["slug"]: Identity(**one["identity"]) for one in details["devices"]},
+            nameplates=self._nameplates(),
+            others_confirmed=details["expert"] and details["others_confirmed"],
         )
         return Transaction(hands, log, terms)
 
@@ -358,6 +361,10 @@ class Desk:
             await self._store.run(lambda to: rows.add_record(to, restore_id, t_ns, one.text, one.seal))
         except (StoreError, SigningKeyError):
             log.exception("the record of restore %s could not be kept", restore_id)
+
+    def _nameplates(self) -> dict[str, str | None]:
+        """Serial numbers on plates as people have typed them, by slug."""
+        return {slug: plate.serial for slug, plate in self._office.library.nameplates.items()}
 
     # -- the gate -----------------------------------------------------------------------
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from app.model.datatypes import Raw
@@ -14,8 +15,10 @@ from app.service.gate import adapter_of
 from app.service.restore.prepare import Prepared
 
 
-def details_of(connection: Connection, prepared: Prepared, before: Mapping[str, str]) -> dict[str, Any]:
-    """The document. ``before``: ids of the records with the values before, by slug."""
+def details_of(
+    connection: Connection, prepared: Prepared, before: Mapping[str, str], nameplates: Mapping[str, str | None]
+) -> dict[str, Any]:
+    """The document. ``before``: ids of the records with the values before, ``nameplates`` as known, both by slug."""
     order, plan = prepared.order, prepared.plan
     adapters = {bus.name: adapter_of(bus.connection) for bus in connection.turbine.buses}
     devices = []
@@ -28,7 +31,7 @@ def details_of(connection: Connection, prepared: Prepared, before: Mapping[str, 
                 "adapter": adapters.get(target.device.bus, ""),
                 "node": target.node,
                 "description": [target.description.id, target.description.version],
-                "identity": found.identity.as_json(),
+                "identity": replace(found.identity, nameplate=nameplates.get(slug)).as_json(),
                 "before": reference(found, before.get(slug, "")),
                 "set": None if given is None else reference(given.parameters, given.record),
                 "same_unit": prepared.same_unit.get(slug),

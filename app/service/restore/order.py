@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any, Final
@@ -126,6 +126,8 @@ class Cause(Enum):
     """RAM holds another value than it was to hold: somebody else writes, or the device lost it."""
     DEVICE_RESTARTED = "device-restarted"
     DRIVE_ENABLED = "drive-enabled"
+    NOT_FIT = "not-fit"
+    """Something speaks against going on; ``details`` have the ``objection_key``, and what fills its text."""
     OVERTAKEN = "overtaken"
     """Somebody sent STOP or FEATHER, and the next step would have undone it."""
     SAVE_FAILED = "save-failed"
@@ -134,6 +136,8 @@ class Cause(Enum):
     CANCELLED = "cancelled"
     OTHER_DEVICE = "other-device"
     """Another device than that of the restore answers in its place."""
+    OTHER_FIRMWARE = "other-firmware"
+    """A device got another firmware meanwhile."""
     BUS_LOST = "bus-lost"
     STORE_FAILED = "store-failed"
     TOOL_ENDED = "tool-ended"
@@ -162,7 +166,9 @@ _HALTING: Final = frozenset(
         Cause.TOOL_ENDED,
         Cause.DEFECT,
         Cause.OTHER_DEVICE,
+        Cause.OTHER_FIRMWARE,
         Cause.OVERTAKEN,
+        Cause.NOT_FIT,
     }
 )
 
@@ -181,4 +187,15 @@ class Broken(Exception):  # noqa: N818 - no error of the tool: how one part of a
         """For whoever ordered the restore."""
         if self.error is not None:
             return self.error
-        return RestoreBrokenError(station=station, device=self.device, cause_key=self.cause.text_key, **self.details)
+        details = {"cause_key": self.cause.text_key, **self.details}
+        if "objection_key" in details:
+            details["cause_key"] = details.pop("objection_key")
+        return RestoreBrokenError(**{**details, "station": station, "device": self.device})
+
+    @classmethod
+    def by(cls, refusals: Iterable[Refusal]) -> Broken | None:
+        """Because of the first of ``refusals``; None where there is none."""
+        first = next(iter(refusals), None)
+        if first is None:
+            return None
+        return cls(Cause.NOT_FIT, first.device, None, **{**first.details, "objection_key": first.objection.text_key})

@@ -81,6 +81,38 @@ def _objections_to_set(slug: str, given: Given, now: ParameterSet, nameplate: st
         yield Refusal(Objection.IDENTITY, slug, {"set": _who(old.identity), "device": _who(new.identity, nameplate)})
 
 
+def objections_to_going_on(connection: Connection, found: Survey) -> Iterator[Refusal]:
+    """What speaks against going on to the new values after an interruption, other blades apart.
+
+    An interruption may have opened the safety chain. The axis stands in feather then, and its stage stays on: that it
+    is not driven is enough (``Hands.quiet``).
+    """
+    yield from (one for one in objections_to_state(found) if one.objection is not Objection.DRIVE_ENABLED)
+    yield from objections_to_surroundings(connection, connection.stamper())
+
+
+def objections_to_going_back(connection: Connection, found: Survey) -> Iterator[Refusal]:
+    """What speaks against putting the old values back: what moves, and who else writes.
+
+    Not the supply and the battery: what they show may come from the new values, and the way out must not need them.
+    """
+    unfit = (Objection.SUPPLY, Objection.BATTERY, Objection.NOT_RECORDING)
+    yield from (one for one in objections_to_going_on(connection, found) if one.objection not in unfit)
+
+
+def is_other_device(then: Identity, now: Identity, nameplate: str | None) -> bool:
+    """True where another device answers than that of a restore. ``nameplate``: as it is known now."""
+    kinds = ((getattr(then, name), getattr(now, name)) for name in ("device_type", "vendor_id", "product_code"))
+    if any(_differ(one, other) for one, other in kinds) or (then.serial or 0) != (now.serial or 0):
+        return True
+    return not then.serial and _differ(then.nameplate, nameplate)
+
+
+def is_other_firmware(then: Identity, now: Identity) -> bool:
+    """True where the device got a firmware meanwhile that its old description need not go with."""
+    return then.software is not None and now.software is not None and _major(then.software) != _major(now.software)
+
+
 def is_same_unit(of_set: Identity, device: Identity, nameplate: str | None) -> bool:
     """True where it is proven that a set comes from this very device.
 

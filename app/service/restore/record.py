@@ -232,7 +232,7 @@ class RecordOf:
         cause = self._outcome.get("cause")
         if cause is None or self._kept.row.state is RestoreState.DONE:
             return ""
-        return load_texts("en")(Cause(cause).text_key)
+        return load_texts("en")(Cause(cause).text_key, **(self._outcome.get("cause_details") or {}))
 
 
 def _finding(one: Mapping[str, Any]) -> FindingRecord:

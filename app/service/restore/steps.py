@@ -28,7 +28,8 @@ from app.service.connection import Connection
 from app.service.devices import Target
 from app.service.journal import Journal
 from app.service.restore.log import RestoreLog, raw_text
-from app.service.restore.order import Broken, Cause, Timing
+from app.service.restore.order import Broken, Cause, Objection, Timing
+from app.service.restore.precheck import objections_to_surroundings
 from app.service.restore.survey import (
     STANDSTILL,
     STATUSWORD,
@@ -96,9 +97,10 @@ class Hands:
 
     # -- what must hold --------------------------------------------------------------
 
-    async def guard(self) -> None:
-        """Nothing has restarted, no frame is missing, no axis is driven."""
+    async def guard(self, direction: Direction) -> None:
+        """Nothing has restarted, no frame is missing, nobody else writes, all is recorded, no axis is driven."""
         self.look_for_restarts()
+        self._look_around(direction)
         for target in self.targets.values():
             if await self._is_driven(target):
                 raise Broken(Cause.DRIVE_ENABLED, target.slug)
@@ -112,6 +114,14 @@ class Hands:
         for slug, target in self.targets.items():
             if boots_of(target) != self._boots.get(slug, 0):
                 raise Broken(Cause.DEVICE_RESTARTED, slug)
+
+    def _look_around(self, direction: Direction) -> None:
+        """No other master has come, and the recording goes on; the way back is gone unrecorded too."""
+        found = objections_to_surroundings(self.connection, self.connection.stamper())
+        back = direction is Direction.BACK
+        broken = Broken.by(one for one in found if not (back and one.objection is Objection.NOT_RECORDING))
+        if broken is not None:
+            raise broken
 
     async def ready(self) -> None:
         """Wait until every device answers."""
@@ -199,7 +209,7 @@ class Hands:
         """One value: intent, write, read back; never twice. ``until`` of the step is waited for."""
         assert step.place is not None and step.raw is not None  # a step that writes has both
         place, target = step.place, self.targets[step.device]
-        await self.guard()
+        await self.guard(direction)
         if step.until is not None:
             await self._let_go(target, direction)
         await self._log.intend(direction, step.kind, step.device, place, step.raw)
@@ -286,7 +296,7 @@ class Hands:
     async def save(self, slug: str, direction: Direction) -> None:
         """1010h, and wait until the device is ready again. From its intent on the memory is in doubt."""
         target = self.targets[slug]
-        await self.guard()
+        await self.guard(direction)
         await self._log.intend(direction, StepKind.SAVE, slug)
         try:
             took = await whole(save(self.connection.driver(target), target, self._journal, self.connection.stamper))

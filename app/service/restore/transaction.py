@@ -19,8 +19,10 @@ from app.model.description import Description
 from app.model.restore.plan import Plan, Step, StepKind
 from app.model.restore.planner import make_plan
 from app.model.restore.wanted import PlanOptions, Wanted
+from app.model.sets import Identity
 from app.model.station import Place
 from app.service.journal import Kind
+from app.service.restore import precheck
 from app.service.restore.log import RestoreLog, error_document
 from app.service.restore.order import Broken, Cause
 from app.service.restore.steps import LOOK_S, Hands, cause_of
@@ -42,7 +44,8 @@ class End(Enum):
 class Terms:
     """What was agreed at the beginning. ``modes``: of operation, by slug, as they were; ``saves``: devices to save.
 
-    ``serials``: serial numbers by slug, None where the device told none.
+    ``identities``: of the devices when it began; ``nameplates`` as they are known now, by slug. ``others_confirmed``:
+    an expert has answered for the other blades.
     """
 
     goals: Mapping[Place, tuple[Raw, Raw]]
@@ -53,7 +56,9 @@ class Terms:
     station: str
     person: str
     reason: str
-    serials: Mapping[str, int | None] = field(default_factory=dict)
+    identities: Mapping[str, Identity] = field(default_factory=dict)
+    nameplates: Mapping[str, str | None] = field(default_factory=dict)
+    others_confirmed: bool = False
 
     def wanted(self, direction: Direction) -> dict[Place, Raw]:
         """The values that a way leads to."""
@@ -78,6 +83,8 @@ class Transaction:
         self._confirmed_by: str | None = None
         self._back_by: str | None = None
         self._deadline: float | None = None
+        self._ordered = False
+        """A person has taken it up after an interruption: whether the station is fit is not known."""
 
     # -- for people ------------------------------------------------------------------
 
@@ -122,11 +129,13 @@ class Transaction:
 
     async def resume(self) -> End:
         """On to the new values from whatever is there. What fails leaves it incomplete: a person decides again."""
+        self._ordered = True
         self._tell(Kind.RESTORE_RESUMED)
         return await self._guarded(self._go_on(), falls_back=False)
 
     async def back(self) -> End:
-        """To the old values from whatever is there."""
+        """To the old values from whatever is there, as a person orders it now."""
+        self._ordered = True
         self._tell(Kind.RESTORE_TURNED_BACK)
         return await self._guarded(self._go_back(), falls_back=False)
 
@@ -161,7 +170,9 @@ class Transaction:
         return End.INCOMPLETE
 
     async def _go_on(self) -> End:
-        await self._log.enter(RestoreState.WRITING, cause=None, error=None, device=None, first_cause=None)
+        await self._log.enter(
+            RestoreState.WRITING, cause=None, cause_details=None, error=None, device=None, first_cause=None
+        )
         options = self._options(self._terms.saves)
         plan = await self._plan(Direction.RESUME, options)
         return await self._go(self._all_steps(plan, Direction.RESUME), Direction.RESUME, None)
@@ -180,11 +191,33 @@ class Transaction:
         await self._hands.ready()
         await self._hands.quiet()
         found = await self._read()
-        for slug, serial in self._terms.serials.items():
-            if found.sets[slug].identity.serial != serial:
-                raise Broken(Cause.OTHER_DEVICE, slug)
+        self._check_devices(found)
+        if self._ordered:
+            await self._check_fit(found, direction)
         self._hands.take(found)
         return make_plan(found.station, _by_device(self._terms.wanted(direction)), options, found.states)
+
+    def _check_devices(self, found: Survey) -> None:
+        """The devices are those that the restore began with."""
+        for slug, then in self._terms.identities.items():
+            now = found.sets[slug].identity
+            if precheck.is_other_device(then, now, self._terms.nameplates.get(slug)):
+                raise Broken(Cause.OTHER_DEVICE, slug)
+            if precheck.is_other_firmware(then, now):
+                raise Broken(Cause.OTHER_FIRMWARE, slug, was=str(then.software), now=str(now.software))
+
+    async def _check_fit(self, found: Survey, direction: Direction) -> None:
+        """What held when it began must hold again; the way back needs less of it."""
+        connection = self._hands.connection
+        if direction is Direction.BACK:
+            refusals = list(precheck.objections_to_going_back(connection, found))
+        else:
+            refusals = list(precheck.objections_to_going_on(connection, found))
+            if not self._terms.others_confirmed:
+                refusals += await precheck.objections_to_other_blades(connection, self._terms.station)
+        broken = Broken.by(refusals)
+        if broken is not None:
+            raise broken
 
     def _options(self, saves: frozenset[str]) -> PlanOptions:
         """For values that stood in these very devices, or were agreed to for them."""
@@ -218,7 +251,9 @@ class Transaction:
                 await self._hands.check(goals)
                 checked = True
             if step.kind is StepKind.RESTART and not restarting:
-                await self._hands.guard()  # of its own chain: from the first restart on, that may drive the axis
+                await self._hands.guard(
+                    direction
+                )  # of its own chain: from the first restart on, that may drive the axis
                 restarting = True
             await self._enter_for(step, direction)
             await self._do(step, direction, confirm_s)

@@ -26,6 +26,7 @@ from app.store.restore_rows import RestoreState
 from app.store.store import Store
 from app.twins.line import CanLine
 from app.twins.line_thread import LineThread
+from app.twins.object_store import Cell
 from app.twins.socketcand_server import SocketcandServer
 from app.twins.turbine import Settings, Turbine
 from tests.service.conftest import MS, Served, connection
@@ -48,6 +49,16 @@ def changed(parameters: ParameterSet, changes: Mapping[str, Raw]) -> ParameterSe
     return replace(
         parameters, values={**parameters.values, **{parse_address(one): raw for one, raw in changes.items()}}
     )
+
+
+def holding(cell: Cell, raw: int) -> Callable[[], None]:
+    """Have a twin's object show ``raw``; gives what ends it."""
+    before, cell.source = cell.source, lambda: raw
+
+    def end() -> None:
+        cell.source = before
+
+    return end
 
 
 @dataclass

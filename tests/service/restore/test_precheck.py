@@ -21,7 +21,7 @@ from app.service.stop import Command, command_all
 from app.service.write import write_raw
 from app.twins.faults import Instructor
 from app.twins.object_store import Cell
-from tests.service.restore.conftest import PMC, PMM, STATION, Bench
+from tests.service.restore.conftest import PMC, PMM, STATION, Bench, holding
 from tests.web.rig import wait_until
 
 Found = set[tuple[Objection, str]]
@@ -100,16 +100,6 @@ async def test_values_of_another_unit_stay_where_they_are(bench: Bench) -> None:
     assert own.same_unit == {PMC: True} and own.goals[place][1] == 11
     assert foreign.same_unit == {PMC: False} and place not in foreign.goals
     assert own.hash != foreign.hash
-
-
-def holding(cell: Cell, raw: int) -> Callable[[], None]:
-    """Have a twin's object show ``raw``; gives what ends it."""
-    before, cell.source = cell.source, lambda: raw
-
-    def end() -> None:
-        cell.source = before
-
-    return end
 
 
 async def test_a_station_that_is_not_fit_is_refused(bench: Bench) -> None:

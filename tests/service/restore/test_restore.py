@@ -14,7 +14,7 @@ from app.model.address import parse_address
 from app.model.description import Verify
 from app.model.fault import FaultOrder
 from app.service.journal import Entry, Kind
-from app.service.restore.order import Cause
+from app.service.restore.order import Cause, Objection
 from app.service.restore.survey import boots_of
 from app.service.restore.transaction import End
 from app.service.save import restart, save
@@ -27,7 +27,7 @@ from app.twins.object_store import RefusedAccessError
 from app.wire.frame import Can
 from app.wire.sdo import Abort
 from tests.service.conftest import MS, Served
-from tests.service.restore.conftest import CHANGES, PMC, PMM, QUICK, Bench
+from tests.service.restore.conftest import CHANGES, PMC, PMM, QUICK, Bench, holding
 from tests.web.rig import wait_until
 
 ACKNOWLEDGE = 0x60
@@ -371,6 +371,54 @@ async def test_a_rollback_that_nobody_asked_for_does_not_overwrite_a_stop_either
     assert await bench.ram(PMC, "6040") == Command.STOP.value
     await bench.desk.roll_back(connection, restore_id, "Anna")
     assert await bench.desk.wait(restore_id) is End.OLD
+
+
+async def test_who_takes_it_up_again_finds_the_station_fit(bench: Bench, served: Served) -> None:
+    """What held when it began must hold again; the way back needs neither battery nor recording."""
+    served.spoil(Fault(download_of(11, "6065"), _cut(served)))
+    restore_id, end = await bench.run()
+    assert end is End.INCOMPLETE
+    await bench.until_connected()
+    connection = bench.connection
+    status = served.turbine.blades[0].pmm.device.store.cell(0x3000)
+    neighbour = served.turbine.blades[1].pmc.device.store.cell(0x6064)
+    serial = served.turbine.blades[0].pmc.device.store.cell(0x1018, 4)
+    recording = connection.recording
+
+    async def resumed() -> tuple[object, object]:
+        await bench.desk.resume(connection, restore_id, "Berta")
+        assert await bench.desk.wait(restore_id) is End.INCOMPLETE
+        outcome = (await bench.desk.get(restore_id)).outcome
+        return outcome["cause"], (outcome.get("cause_details") or {}).get("objection_key")
+
+    for cell, raw, objection in (
+        (status, 0x08, Objection.BATTERY),
+        (neighbour, 0, Objection.OTHER_BLADES),
+        (serial, 4711, None),
+    ):
+        end_it = holding(cell, raw)
+        expected = (Cause.OTHER_DEVICE.value, None)
+        assert await resumed() == (expected if objection is None else (Cause.NOT_FIT.value, objection.text_key))
+        end_it()
+    connection.recording = None
+    assert await resumed() == (Cause.NOT_FIT.value, Objection.NOT_RECORDING.text_key)
+    end_it = holding(status, 0x08)
+    await bench.desk.roll_back(connection, restore_id, "Berta")
+    assert await bench.desk.wait(restore_id) is End.OLD
+    end_it()
+    connection.recording = recording
+
+
+async def test_a_recording_that_ends_halts_the_restore(bench: Bench) -> None:
+    connection = bench.connection
+    restore_id = await bench.begin(confirm_s=30.0)
+    await bench.until_state(restore_id, RestoreState.AWAITING_CONFIRMATION)
+    recording, connection.recording = connection.recording, None
+    await bench.desk.confirm(restore_id, "Anna")
+    assert await bench.desk.wait(restore_id) is End.INCOMPLETE
+    kept = await bench.desk.get(restore_id)
+    assert (kept.outcome["cause"], kept.saves_begun) == (Cause.NOT_FIT.value, frozenset()), "nothing was saved"
+    connection.recording = recording
 
 
 async def test_another_masters_write_is_not_saved(bench: Bench) -> None:
