@@ -55,8 +55,8 @@ def dump_dcf(parameters: ParameterSet, description: Description, file_name: str 
     origin = parameters.origin
     configured = Configured(
         node=origin.node,
-        name=_one_line(origin.device),
-        network=_one_line(origin.turbine),
+        name=origin.device,
+        network=origin.turbine,
         serial=parameters.identity.serial or 0,
         values=texts,
         comments=tuple(_comments(head_of(parameters, others))),
@@ -105,7 +105,7 @@ def _text(entry: Entry, raw: Raw) -> str | None:
 
 
 def _one_line(text: str) -> str:
-    """A text of elsewhere that begins no line and no section of its own; as it is it stands in the head."""
+    """A name of elsewhere that begins no line and no section of its own; as it is it stands in the head."""
     return "".join(character if character.isprintable() else "_" for character in text)
 
 

@@ -46,6 +46,20 @@ def test_arguments_that_do_not_go_together(
     assert not (tmp_path / "data").exists(), "nothing was opened"
 
 
+def test_a_record_is_never_written_over_and_nothing_is_begun_for_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    there, gone = tmp_path / "there.pdf", tmp_path / "gone.pdf"
+    there.write_bytes(b"an older record")
+    gone.symlink_to(tmp_path / "no" / "where")
+    for target in (there, gone):
+        words = ("set.json", "--can", "virtual:x", "--record-file", str(target), "--data", str(tmp_path / "data"))
+        assert main(["restore", *words]) == 2
+        assert f"{target} is there already" in capsys.readouterr().err
+    assert not (tmp_path / "data").exists(), "nothing was opened"
+    assert there.read_bytes() == b"an older record"
+
+
 def test_only_one_way_at_a_time(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as caught:
         main(["restore", "--resume", "--roll-back", "--can", "virtual:x"])
