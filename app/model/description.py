@@ -296,6 +296,13 @@ class Description:
             raise UnknownObjectError(device=self.id, address=address.short)
         return found
 
+    def name_key(self, entry: Entry, raw: Raw) -> str | None:
+        """Text key of the name that an enumeration gives the value; None where it gives none."""
+        if entry.enumeration is None or not isinstance(raw, int):
+            return None
+        named = self.enumerations[entry.enumeration].by_value(raw)
+        return None if named is None else named.text_key
+
     def has_index(self, index: int) -> bool:
         """True where any sub-index of ``index`` exists."""
         return index in self._indices

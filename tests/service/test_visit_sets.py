@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from app.model.address import Address
 from app.model.set_record import Tag
 from app.model.sets import ParameterSet, load_set
 from app.model.site import load_site
@@ -17,6 +18,7 @@ from app.service.bench import Bench
 from app.service.compare.ground import ground_of
 from app.service.compare.sources import Columns
 from app.service.link import DEVICE_NAME
+from app.service.office.visit_changes import compare
 from app.service.sites import Sites
 from app.store.set_rows import Filter
 from app.store.store import Store
@@ -25,6 +27,8 @@ from app.twins.line import Fault, drop
 from tests.e2e.conftest import site_for
 from tests.service.conftest import Served
 from tests.service.test_visits import LIMIT, PMM, describe, options, until, write
+
+PMC = "wtg-07/blade-1/pmc"
 
 
 @pytest.fixture
@@ -131,3 +135,17 @@ async def test_a_complete_read_finds_a_device_that_the_look_did_not(bench: Bench
     live = await Columns(ground_of(bench)).resolve(f"live:{PMM}")
     assert live.complete
     assert live.column.empty == set(bench.office.visits.found[PMM].empty) != set()
+
+
+async def test_a_change_of_a_value_that_has_a_name_is_told_by_it(bench: Bench) -> None:
+    connection = await bench.connect("wtg-07", "anna")
+    await until(lambda: bench.office.visits.looked)
+    found, target = bench.office.visits.found[PMC], connection.target(PMC)
+    reaction, gear = Address(0x6007), Address(0x6065)
+    then = replace(found, values={**found.values, reaction: 0, gear: 99})
+    now = replace(found, values={**found.values, reaction: 2, gear: 100})
+    rows = {row.address: (row.was_key, row.now_key) for row in compare(target, then, now, {}).rows}
+    assert rows == {
+        reaction: ("enum.abort_connection.no_action", "enum.abort_connection.disable_voltage"),
+        gear: (None, None),
+    }

@@ -9,7 +9,7 @@ from typing import Final
 
 from app.model.address import Address
 from app.model.datatypes import Raw
-from app.model.description import Description, Entry, Quantity, QuantityRule
+from app.model.description import Description, Quantity, QuantityRule
 from app.model.set_head import NOT_IN_FILE
 from app.model.set_vector import exact
 from app.model.values import quantity_of, show, to_scaled
@@ -85,13 +85,7 @@ class Column:
         shown = show(entry, raw, self.values.get)
         scaled = to_scaled(entry, raw, self.values.get)
         unit = "" if scaled is None else scaled.unit
-        return Cell(state, raw, shown, unit, self._name(entry, raw))
-
-    def _name(self, entry: Entry, raw: Raw) -> str | None:
-        if entry.enumeration is None or not isinstance(raw, int):
-            return None
-        named = self.description.enumerations[entry.enumeration].by_value(raw)
-        return None if named is None else named.text_key
+        return Cell(state, raw, shown, unit, self.description.name_key(entry, raw))
 
     def measure(self, address: Address) -> Measure:
         """By what a value at ``address`` is to be understood: only equal ones can be compared."""

@@ -9,7 +9,7 @@ from typing import Final
 
 from app.model.address import Address, parse_address
 from app.model.datatypes import Raw
-from app.model.description import Entry
+from app.model.description import Description, Entry
 from app.model.sets import ParameterSet
 from app.model.values import show
 from app.service.devices import Target, decode
@@ -44,7 +44,7 @@ class Time(Enum):
 class ChangedRow:
     """One parameter whose raw values differ; who wrote it and when where that was seen (``person`` "": another master).
 
-    ``t_ns`` None: nobody saw it.
+    ``t_ns`` None: nobody saw it. ``was_key`` and ``now_key``: text keys where an enumeration names the value.
     """
 
     address: Address
@@ -53,6 +53,8 @@ class ChangedRow:
     now: Raw
     was_shown: str
     now_shown: str
+    was_key: str | None
+    now_key: str | None
     person: str | None
     t_ns: int | None
 
@@ -129,13 +131,15 @@ def compare(
                 unknown.append((entry.address, entry.title, side))
         elif was_raw != now_raw:
             writer = writers.get((target.slug, entry.address.short))
-            rows.append(_row(entry, then, now, writer))
+            rows.append(_row(target.description, entry, then, now, writer))
     serials = then.identity.serial, now.identity.serial
     replaced = None not in serials and serials[0] != serials[1]
     return DeviceChanges(target.slug, tuple(rows), tuple(unknown), None, replaced)
 
 
-def _row(entry: Entry, then: ParameterSet, now: ParameterSet, writer: AuditRow | None) -> ChangedRow:
+def _row(
+    description: Description, entry: Entry, then: ParameterSet, now: ParameterSet, writer: AuditRow | None
+) -> ChangedRow:
     was_raw, now_raw = then.values[entry.address], now.values[entry.address]
     return ChangedRow(
         address=entry.address,
@@ -144,6 +148,8 @@ def _row(entry: Entry, then: ParameterSet, now: ParameterSet, writer: AuditRow |
         now=now_raw,
         was_shown=show(entry, was_raw, then.values.get),
         now_shown=show(entry, now_raw, now.values.get),
+        was_key=description.name_key(entry, was_raw),
+        now_key=description.name_key(entry, now_raw),
         person=None if writer is None else writer.person,
         t_ns=None if writer is None else writer.t_ns,
     )

@@ -69,7 +69,7 @@ class VisitChange(BaseModel):
 
 
 class ChangedValue(BaseModel):
-    """A parameter that was ``was`` and is ``now``. ``person`` and ``t_ns`` are null where nobody saw the write.
+    """A parameter that was ``was`` and is ``now``; the keys where an enumeration names that. ``person`` and ``t_ns`` are null where nobody saw the write.
 
     ``person`` is empty where another master wrote it.
     """
@@ -80,6 +80,8 @@ class ChangedValue(BaseModel):
     now_raw: RawJson
     was_shown: str
     now_shown: str
+    was_key: str | None
+    now_key: str | None
     person: str | None
     t_ns: int | None
 
@@ -114,6 +116,8 @@ class ChangedDevice(BaseModel):
                     now_raw=raw_to_json(row.now),
                     was_shown=row.was_shown,
                     now_shown=row.now_shown,
+                    was_key=row.was_key,
+                    now_key=row.now_key,
                     person=row.person,
                     t_ns=row.t_ns,
                 )

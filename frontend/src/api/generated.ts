@@ -816,6 +816,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/live/restores/{restore_id}/give-up": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Give Up Restore
+         * @description Close one that can be neither resumed nor rolled back; its station takes writes again, as it is.
+         */
+        post: operations["give_up_restore"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/live/restores/{restore_id}/resume": {
         parameters: {
             query?: never;
@@ -2393,7 +2413,7 @@ export interface components {
         };
         /**
          * ChangedValue
-         * @description A parameter that was ``was`` and is ``now``. ``person`` and ``t_ns`` are null where nobody saw the write.
+         * @description A parameter that was ``was`` and is ``now``; the keys where an enumeration names that. ``person`` and ``t_ns`` are null where nobody saw the write.
          *
          *     ``person`` is empty where another master wrote it.
          */
@@ -2402,6 +2422,8 @@ export interface components {
             address: string;
             /** Name */
             name: string;
+            /** Now Key */
+            now_key: string | null;
             /** Now Raw */
             now_raw: number | string;
             /** Now Shown */
@@ -2410,6 +2432,8 @@ export interface components {
             person: string | null;
             /** T Ns */
             t_ns: number | null;
+            /** Was Key */
+            was_key: string | null;
             /** Was Raw */
             was_raw: number | string;
             /** Was Shown */
@@ -2997,6 +3021,14 @@ export interface components {
             twin: boolean;
             /** Vendor */
             vendor: number | null;
+        };
+        /**
+         * GiveUpRequest
+         * @description Why a restore is closed although the station may hold old and new values.
+         */
+        GiveUpRequest: {
+            /** Reason */
+            reason: string;
         };
         /**
          * HeardDoc
@@ -4234,7 +4266,7 @@ export interface components {
             /** Blocks */
             blocks: boolean;
             /** Can */
-            can: ("confirm" | "roll-back" | "resume")[];
+            can: ("confirm" | "roll-back" | "resume" | "give-up")[];
             /** Cause Details */
             cause_details: {
                 [key: string]: string;
@@ -4250,7 +4282,7 @@ export interface components {
             /** Done */
             done: number;
             /** End */
-            end: ("new" | "old" | "incomplete") | null;
+            end: ("new" | "old" | "incomplete" | "given-up") | null;
             /** Ended Ns */
             ended_ns: number | null;
             error: components["schemas"]["Failure"] | null;
@@ -4274,7 +4306,7 @@ export interface components {
              * State
              * @enum {string}
              */
-            state: "writing" | "awaiting-confirmation" | "saving" | "restarting" | "proving" | "done" | "rolling-back" | "rolled-back" | "incomplete";
+            state: "writing" | "awaiting-confirmation" | "saving" | "restarting" | "proving" | "done" | "rolling-back" | "rolled-back" | "incomplete" | "given-up";
             /** Station */
             station: string;
             /** Steps */
@@ -4328,7 +4360,7 @@ export interface components {
             /** Cause Key */
             cause_key: string | null;
             /** End */
-            end: ("new" | "old" | "incomplete") | null;
+            end: ("new" | "old" | "incomplete" | "given-up") | null;
             /** Ended Ns */
             ended_ns: number | null;
             /** Id */
@@ -4343,7 +4375,7 @@ export interface components {
              * State
              * @enum {string}
              */
-            state: "writing" | "awaiting-confirmation" | "saving" | "restarting" | "proving" | "done" | "rolling-back" | "rolled-back" | "incomplete";
+            state: "writing" | "awaiting-confirmation" | "saving" | "restarting" | "proving" | "done" | "rolling-back" | "rolled-back" | "incomplete" | "given-up";
             /** Station */
             station: string;
             /** Turbine */
@@ -8990,6 +9022,82 @@ export interface operations {
             content: {
                 /** @example {} */
                 "application/json": components["schemas"]["Nothing"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["RestoreDoc"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    give_up_restore: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                restore_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "reason": "the PMC was exchanged, a set is restored into the new one"
+                 *     }
+                 */
+                "application/json": components["schemas"]["GiveUpRequest"];
             };
         };
         responses: {

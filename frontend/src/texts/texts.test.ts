@@ -17,6 +17,16 @@ describe("texts", () => {
     expect(t.nameOf("battery")).toBe("battery");
   });
 
+  it("name an entry of an array after both, as far as there are names", () => {
+    const de = translator(
+      { "name.drive data": "Antrieb", "name.limit": "Grenze", "name.a: b": "eins" },
+      "de",
+    );
+    expect(de.nameOf("drive data: limit")).toBe("Antrieb: Grenze");
+    expect(de.nameOf("drive data: else")).toBe("Antrieb: else");
+    expect(de.nameOf("a: b")).toBe("eins");
+  });
+
   it("look up details that are keys themselves", () => {
     expect(t("why", { device: "PMM", text_key_reason: "abort" })).toBe("PMM: value out of range");
     expect(t("why", { device: "PMM", reason_key: "abort" })).toBe("PMM: value out of range");

@@ -16,7 +16,13 @@ const DASH = "–";
 export function translator(texts: Readonly<Record<string, string>>, language: Language): Translate {
   const t = (key: string, details: Details = {}): string => fill(texts[key] ?? key, nested(texts, details));
   return Object.assign(t, {
-    nameOf: (english: string) => texts[`name.${english}`] ?? english,
+    // An entry of an array is called after both: "drive data: min DC link voltage".
+    nameOf: (english: string) =>
+      texts[`name.${english}`] ??
+      english
+        .split(": ")
+        .map((part) => texts[`name.${part}`] ?? part)
+        .join(": "),
     has: (key: string) => key in texts,
     language,
   });

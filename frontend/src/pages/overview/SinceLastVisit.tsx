@@ -2,9 +2,11 @@ import { IconAlertTriangle, IconHistory } from "@tabler/icons-react";
 import { useQuery } from "@tanstack/react-query";
 import { Link } from "@tanstack/react-router";
 import { type ChangedDevice, type SinceLastVisit as Changes, sinceLastVisitQuery } from "../../api/visits";
+import type { Raw } from "../../api/types";
 import { type PageSearch, roomSearch } from "../../frame/search";
 import { useBench, useLink } from "../../live/live";
-import { useTexts } from "../../texts/texts";
+import { localise } from "../../model/values";
+import { type Translate, useTexts } from "../../texts/texts";
 import { useDeviceName } from "../../ui/devices";
 import { dayAndTime } from "../../ui/format";
 import { storyOf } from "../../ui/problem";
@@ -98,7 +100,8 @@ function Device({ changed }: { changed: ChangedDevice }) {
               {row.address} {t.nameOf(row.name)}
             </Link>
             <span>
-              {row.was_shown} → <strong>{row.now_shown}</strong>
+              {told(row.was_key, row.was_raw, row.was_shown, t)} →{" "}
+              <strong>{told(row.now_key, row.now_raw, row.now_shown, t)}</strong>
             </span>
             <span className="dim">
               {row.t_ns === null
@@ -116,6 +119,12 @@ function Device({ changed }: { changed: ChangedDevice }) {
       )}
     </>
   );
+}
+
+/** In words where an enumeration names the value. */
+function told(key: string | null, raw: Raw, shown: string, t: Translate): string {
+  if (key !== null) return t(key);
+  return typeof raw === "number" ? localise(shown, t.language) : shown;
 }
 
 function Warning({ text }: { text: string }) {

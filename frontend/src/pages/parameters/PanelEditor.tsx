@@ -32,7 +32,10 @@ export function Locked({ entry, lock }: { entry: EntryDoc; lock: Lock }) {
   );
 }
 
-/** Editor, RAM and store told apart; what is typed becomes a pending change, and nothing is sent. */
+/**
+ * Editor, RAM and store told apart; what is typed becomes a pending change, and nothing is sent. What is said of it while
+ * it is typed comes below the button, in a place of its own: the button never moves away from the pointer.
+ */
 export function PanelEditor({ entry }: { entry: EntryDoc }) {
   const device = useDevice();
   const { t, slug } = device;
@@ -60,8 +63,6 @@ export function PanelEditor({ entry }: { entry: EntryDoc }) {
       <Stack gap="sm">
         <ValueEditor entry={entry} draft={draft} />
         <Preview entry={entry} from={rawOf(cell)} to={draft.raw} />
-        <Speaks entry={entry} draft={draft} />
-        <RulesSay entry={entry} draft={draft} />
         {siblings.length > 1 && (
           <Checkbox
             label={t("page.stage.all", { count: siblings.length })}
@@ -85,6 +86,10 @@ export function PanelEditor({ entry }: { entry: EntryDoc }) {
             </Button>
           )}
         </Group>
+        <div className={classes.said} data-testid="said">
+          <Speaks entry={entry} draft={draft} />
+          <RulesSay entry={entry} draft={draft} />
+        </div>
         <Places entry={entry} onTake={take} />
       </Stack>
     </form>
@@ -105,7 +110,7 @@ function isDone(
 
 function Preview({ entry, from, to }: { entry: EntryDoc; from: Raw | null; to: Raw | null }) {
   const device = useDevice();
-  if (to === null) return null;
+  if (to === null) return <div className={classes.preview} />;
   const hex = isInteger(entry) && typeof to === "number" ? hexadecimal(entry, to) : "";
   return (
     <div className={classes.preview} data-testid="preview">

@@ -33,6 +33,7 @@ function TextEditor({ entry, draft }: Props) {
   };
   return (
     <TextInput
+      className={classes.typed ?? ""}
       label={t("page.entry.new_value")}
       description={draft.hint === "" ? undefined : draft.hint}
       rightSection={unit !== "" && !isHex(entry) ? <Text size="sm">{unit}</Text> : undefined}
