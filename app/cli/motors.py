@@ -318,7 +318,8 @@ async def _delete(arguments: argparse.Namespace, output: Output, motors: Motors)
 
 def _apply(arguments: argparse.Namespace, output: Output) -> int:
     motor = asyncio.run(_spec(arguments))
-    nothing = {"station": None, "select": None, "resume": None, "roll_back": None, "list": False, "record_of": None}
+    ways = dict.fromkeys(("resume", "roll_back", "give_up", "record_of"))
+    nothing = {"station": None, "select": None, "list": False, **ways}
     return restore(argparse.Namespace(**vars(arguments) | nothing | {"set": [motor]}), output)
 
 

@@ -101,6 +101,7 @@ def read_motors(description: Description, data: bytes, file: str) -> list[FileRo
     columns = _Columns(description, head, file)
     rows = [columns.row(line, cells) for line, cells in lines if any(cells)]
     _each_id_once(rows, file)
+    columns.check_whole(rows)
     return rows
 
 
@@ -174,6 +175,16 @@ class _Columns:
         except MotorFieldError as error:
             raise self._of(line, error) from error
         return FileRow(line, self._id(line, by_key.get(ID, "")), draft, source == Source.EXAMPLE.value)
+
+    def check_whole(self, rows: Iterable[FileRow]) -> None:
+        """A row with an id is the next version of a motor: what has no column would be dropped from it, unseen.
+
+        Examples have no further version.
+        """
+        missing = next((key for key in (*self._plate, *self._entries, *_AFTER) if key not in self._titles), None)
+        known = next((row for row in rows if row.id is not None and not row.invented), None)
+        if missing is not None and known is not None:
+            raise self._error(known.line, missing, "motor.file.drops")
 
     def _key(self, title: str) -> str:
         """Field, or address of the parameter, that a column holds; its unit, where one is named, must be ours."""

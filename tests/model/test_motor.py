@@ -212,6 +212,8 @@ HEAD: Final = "id,maker,type,power_kw,6073,6402"
         ("maker,type,power_kw [W]\n", 1, "power_kw [W]", "motor.file.unit"),
         ("maker,type,6073 max current [A]\n", 1, "6073 max current [A]", "motor.file.unit"),
         (f"{HEAD}\n,A,B,1,100,\n,A,B,1,100\n", 3, "–", "motor.file.count"),
+        (f"{HEAD}\n,A,B,5,100,\n,A\n", 3, "–", "motor.file.count"),
+        (f"{HEAD}\n,A,B,5,100,\n{ID},A,C,5,100,\n", 3, "torque_nm", "motor.file.drops"),
         (f"{HEAD}\n,A,B,much,100,\n", 2, "power_kw", "motor.file.no_number"),
         (f"{HEAD}\n,A,B,5000,100,\n", 2, "power_kw", "motor.flaw.range"),
         (f"{HEAD}\n,A,B,5,300,\n", 2, "6073", "motor.flaw.range"),
