@@ -11,11 +11,12 @@ import threading
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from app.cli.arguments import seconds
 from app.cli.connecting import connected, run_command
 from app.cli.output import Output
+from app.cli.restore_kept import give_up, list_restores
 from app.cli.restore_record import check_target, earlier_record, try_record
 from app.cli.restore_told import Told
 from app.cli.targets import add_connection
@@ -32,7 +33,7 @@ from app.service.restore.motor_given import given_motor, is_motor
 from app.service.restore.order import Given, Order
 from app.service.restore.survey import targets_of
 from app.service.restore.transaction import End
-from app.store.restore_rows import RestoreRow, RestoreState, list_restores
+from app.store.restore_rows import RestoreState
 from app.store.store import Store
 
 CONFIRM_S: Final = 300.0
@@ -51,6 +52,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     way = parser.add_mutually_exclusive_group()
     way.add_argument("--resume", nargs="?", const="", metavar="ID", help="go on with one that is incomplete")
     way.add_argument("--roll-back", nargs="?", const="", metavar="ID", help="take back one that is incomplete")
+    way.add_argument("--give-up", metavar="ID", help="with --expert and --reason: close one whose device is gone")
     way.add_argument("--list", action="store_true", help="restores of the data folder, newest first")
     way.add_argument("--record-of", metavar="ID", help="write the record of one that has ended to --record-file")
     parser.set_defaults(run=restore)
@@ -83,9 +85,11 @@ def restore(arguments: argparse.Namespace, output: Output) -> int:
     """Do what the arguments say; gives the exit code."""
     _check(arguments)
     if arguments.list:
-        return run_command(_list(arguments, output))
+        return run_command(list_restores(arguments, output))
     if arguments.record_of is not None:
         return run_command(earlier_record(arguments, output))
+    if arguments.give_up is not None:
+        return run_command(give_up(arguments, output))
     decided = arguments.resume is not None or arguments.roll_back is not None
     return run_command((_decide if decided else _restore)(arguments, output))
 
@@ -93,11 +97,11 @@ def restore(arguments: argparse.Namespace, output: Output) -> int:
 def _check(arguments: argparse.Namespace) -> None:
     """Raises UsageError where the arguments do not go together."""
     decided = arguments.resume is not None or arguments.roll_back is not None
-    alone = arguments.list or arguments.record_of is not None
+    alone = arguments.list or arguments.record_of is not None or arguments.give_up is not None
     if alone or decided:
         if arguments.set:
             raise UsageError(
-                reason="sets are named only for a new restore, not with --list, --record-of, --resume or --roll-back"
+                reason="sets are for a new restore, not for --list, --record-of, --give-up, --resume or --roll-back"
             )
     elif not arguments.set:
         raise UsageError(reason="name the sets to restore: files, or ids of the library")
@@ -118,36 +122,8 @@ def _check_terms(arguments: argparse.Namespace) -> None:
         check_target(arguments.record_file)
     elif arguments.record_of is not None:
         raise UsageError(reason="--record-of: name the file with --record-file FILE")
-
-
-# -- list ----------------------------------------------------------------------------
-
-
-async def _list(arguments: argparse.Namespace, output: Output) -> int:
-    store = Store.open(arguments.settings.data)
-    try:
-        rows = await store.run(list_restores)
-    finally:
-        store.close()
-    if output.as_json:
-        output.result([_row_dict(row) for row in rows], "")
-        return 0
-    head = ("ID", "STATION", "STATE", "PERSON", "WORK ORDER")
-    output.table(
-        head,
-        [(row.id, row.station, output.texts(_shown_state(row)), row.person, row.work_order or "–") for row in rows],
-    )
-    return 0
-
-
-def _shown_state(row: RestoreRow) -> str:
-    """Nobody works on any of them: the store is ours."""
-    return (row.state if row.state.ended else RestoreState.INCOMPLETE).text_key
-
-
-def _row_dict(row: RestoreRow) -> dict[str, Any]:
-    state = row.state if row.state.ended else RestoreState.INCOMPLETE
-    return {"id": row.id, "station": row.station, "state": state.value, "person": row.person, "reason": row.reason}
+    if arguments.give_up is not None and not (arguments.expert and arguments.reason.strip()):
+        raise UsageError(reason="--give-up leaves a station as it is, half old and half new: add --expert and --reason")
 
 
 # -- restore -------------------------------------------------------------------------

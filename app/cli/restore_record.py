@@ -5,19 +5,15 @@ from __future__ import annotations
 import argparse
 import asyncio
 import os
-import time
 from pathlib import Path
 from typing import Final
 
 from app.cli.output import Output
+from app.cli.restore_kept import desk_alone
 from app.errors import HubsideError, RestoreRecordError, UsageError
-from app.service.journal import Journal
-from app.service.office.office import Office
 from app.service.records.files import SealedRecord, html_file, pdf_file
 from app.service.records.signing import SigningKey
 from app.service.restore.desk import Desk
-from app.store.store import Store
-from app.wire.frame import Stamper
 
 SUFFIXES: Final = (".html", ".pdf", ".json")
 
@@ -59,15 +55,8 @@ async def try_record(desk: Desk, restore_id: str, path: Path | None, language: s
 async def earlier_record(arguments: argparse.Namespace, output: Output) -> int:
     """``--record-of ID``: of a restore that came to its end before. Needs no connection."""
     settings = arguments.settings
-    stamp = Stamper(time.time_ns(), time.monotonic_ns)
-    journal = Journal(stamp, settings.person)
-    office = Office(Store.open(settings.data), journal, stamp, settings.person)
-    desk = Desk(office, journal, stamp, data=settings.data)
-    try:
+    async with desk_alone(settings) as desk:
         await write_record(desk, arguments.record_of, arguments.record_file, settings.language)
-    finally:
-        await desk.close()
-        await office.close()
     details = {"restore": arguments.record_of, "file": str(arguments.record_file)}
     output.result(details, output.texts("cli.restore_record", **details))
     return 0

@@ -50,6 +50,7 @@ class Kind(Enum):
     RESTORE_DONE = "restore_done"
     RESTORE_ROLLED_BACK = "restore_rolled_back"
     RESTORE_INCOMPLETE = "restore_incomplete"
+    RESTORE_GIVEN_UP = "restore_given_up"
 
     @property
     def severity(self) -> Severity:
@@ -76,6 +77,7 @@ _WARNINGS: Final = (
     Kind.RESTORE_TURNED_BACK,
     Kind.RESTORE_RESUMED,
     Kind.RESTORE_ROLLED_BACK,
+    Kind.RESTORE_GIVEN_UP,
     Kind.OTHER_MASTER,
     Kind.CONSENT,
     Kind.RECORDING_STOPPED,
@@ -91,6 +93,7 @@ _DONE: Final = (
     Kind.RESTORE_CONFIRMED,
     Kind.RESTORE_TURNED_BACK,
     Kind.RESTORE_RESUMED,
+    Kind.RESTORE_GIVEN_UP,
     Kind.CONNECTED,
     Kind.DISCONNECTED,
     Kind.CONSENT,

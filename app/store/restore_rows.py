@@ -24,6 +24,7 @@ class RestoreState(Enum):
     """How a restore stands; the value is the end of its text key ``restore.state.…``.
 
     ``INCOMPLETE``: nobody works on it, and the station may hold old and new values: resume, or roll back.
+    ``GIVEN_UP``: neither was possible, and an expert answers for what stands in the station.
     """
 
     WRITING = "writing"
@@ -35,11 +36,12 @@ class RestoreState(Enum):
     ROLLING_BACK = "rolling-back"
     ROLLED_BACK = "rolled-back"
     INCOMPLETE = "incomplete"
+    GIVEN_UP = "given-up"
 
     @property
     def ended(self) -> bool:
-        """True where the station holds the new values or the old ones: nothing is blocked any more."""
-        return self in (RestoreState.DONE, RestoreState.ROLLED_BACK)
+        """True where the station holds the new values or the old ones, or it was given up: nothing is blocked."""
+        return self in (RestoreState.DONE, RestoreState.ROLLED_BACK, RestoreState.GIVEN_UP)
 
     @property
     def text_key(self) -> str:

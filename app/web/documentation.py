@@ -83,6 +83,7 @@ BODIES: Final[dict[str, Any]] = {
         "work_order": "WO-20417",
         "confirm_s": 300,
     },
+    "GiveUpRequest": {"reason": "the PMC was exchanged, a set is restored into the new one"},
     "BackupRequest": {"reason": "before the exchange of the motor"},
     "LoginRequest": {"name": "Anna", "password": "correct horse battery"},
     "OwnPassword": {"old": "correct horse battery", "new": "blade and hub 12"},

@@ -106,6 +106,24 @@ def test_the_person_decides_and_a_killed_tool_leaves_the_way_back(twins: Twins, 
     assert ": new." in out and "not yet proven" in out and limit(twins) == 490
 
 
+def test_what_can_never_be_finished_is_given_up_for_a_reason(twins: Twins, tmp_path: Path) -> None:
+    data = tmp_path / "data"
+    site = (*at(twins), "--data", str(data))
+    file = other_set(twins, data)
+    with asked(file, *site) as popen:
+        popen.kill()
+    (row,) = hubside("restore", "--list", "--data", str(data), "--json").json
+    order = ("restore", "--give-up", row["id"], "--data", str(data), "--json")
+    for terms in ((), ("--expert",), ("--expert", "--reason", " ")):
+        refused = hubside(*order, *terms)
+        assert (refused.code, refused.error["error"]) == (2, "usage"), terms
+    assert hubside("save", *site, PMM, "--json").code == 3
+    done = hubside(*order, "--expert", "--reason", "PMC exchanged")
+    assert (done.code, done.json["state"]) == (0, "given-up"), done.err
+    assert hubside("save", *site, PMM, "--json").code == 0
+    assert hubside(*order, "--expert", "--reason", "once more").error["error"] == "restore_state"
+
+
 def test_the_gate_holds_beside_a_server_that_has_the_store(twins: Twins, tmp_path: Path) -> None:
     data = tmp_path / "data"
     site = (*at(twins), "--data", str(data))

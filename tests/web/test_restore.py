@@ -133,7 +133,7 @@ async def test_stop_and_feather_pass_an_incomplete_restore_and_motion_does_not(s
     await until(server, doc["id"], "awaiting-confirmation")
     await server.bench.restores.close()
     doc = await until(server, doc["id"], "incomplete")
-    assert (doc["end"], doc["blocks"], doc["can"]) == ("incomplete", True, ["resume", "roll-back"])
+    assert (doc["end"], doc["blocks"], doc["can"]) == ("incomplete", True, ["resume", "roll-back", "give-up"])
     assert doc["cause_key"] == "restore.cause.tool-ended"
     refused = await server.client.post(f"/api/live/devices/{PMC}/write", json={"address": "6065", "raw": 120})
     assert (refused.status_code, refused.json()["code"]) == (409, "restore_open")
@@ -144,6 +144,29 @@ async def test_stop_and_feather_pass_an_incomplete_restore_and_motion_does_not(s
     await post(server, f"/api/live/restores/{doc['id']}/resume")
     doc = await until(server, doc["id"], "done", "rolled-back", "incomplete")
     assert doc["end"] == "new", doc["cause_key"]
+
+
+async def as_expert(server: Server) -> None:
+    """The first user is one."""
+    anna = {"name": "Anna", "password": "pitch and yaw 7"}
+    assert (await server.client.post("/api/users", json=anna)).json()["role"] == "expert"
+    assert (await server.client.post("/api/login", json=anna)).is_success
+
+
+async def test_giving_up_needs_a_reason_and_opens_the_gate(server: Server) -> None:
+    doc = await begun(server)
+    await until(server, doc["id"], "awaiting-confirmation")
+    path = f"/api/live/restores/{doc['id']}/give-up"
+    assert (await server.client.post(path, json={"reason": "PMC exchanged"})).json()["code"] == "role"
+    await as_expert(server)
+    early = await server.client.post(path, json={"reason": "PMC exchanged"})
+    assert (early.status_code, early.json()["code"]) == (409, "restore_state"), "it is worked on"
+    await server.bench.restores.close()
+    assert (await server.client.post(path, json={"reason": "   "})).status_code == 422
+    given = (await server.client.post(path, json={"reason": "PMC exchanged"})).json()
+    assert (given["end"], given["blocks"], given["can"]) == ("given-up", False, [])
+    written = await server.client.post(f"/api/live/devices/{PMC}/write", json={"address": "6065", "raw": 120})
+    assert written.status_code == 200, written.text
 
 
 async def test_what_is_open_is_listed_however_much_came_after_it(server: Server) -> None:
@@ -195,9 +218,7 @@ async def test_to_restore_as_an_expert_is_a_choice_that_needs_the_role(server: S
         body = {"station": STATION, "sets": sets, "expert": True, **more}
         refused = await server.client.post(path, json=body)
         assert (refused.status_code, refused.json()["code"]) == (403, "role"), path
-    anna = {"name": "Anna", "password": "pitch and yaw 7"}
-    assert (await server.client.post("/api/users", json=anna)).json()["role"] == "expert"
-    assert (await server.client.post("/api/login", json=anna)).is_success
+    await as_expert(server)
     plain = await plan_of(server, changes)
     chosen = await plan_of(server, changes, expert=True)
     treated = [

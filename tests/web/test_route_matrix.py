@@ -109,6 +109,7 @@ ROUTES: Final[dict[tuple[str, str], Role]] = {
     ("POST", "/api/live/restores/{restore_id}/confirm"): TECHNICIAN,
     ("POST", "/api/live/restores/{restore_id}/roll-back"): TECHNICIAN,
     ("POST", "/api/live/restores/{restore_id}/resume"): TECHNICIAN,
+    ("POST", "/api/live/restores/{restore_id}/give-up"): EXPERT,
     ("GET", "/api/records/{record_file}"): VIEWER,
     # faults in our own twins
     ("GET", "/api/instructor"): VIEWER,

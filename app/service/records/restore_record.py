@@ -28,6 +28,8 @@ class Outcome(Enum):
     """Everything is as it was before."""
     INCOMPLETE = "incomplete"
     """Something between; motion is blocked until it is resumed or rolled back."""
+    GIVEN_UP = "given-up"
+    """Something between, and an expert has taken it upon himself to go on so."""
 
     @property
     def text_key(self) -> str:

@@ -36,7 +36,8 @@ from app.service.records.files import SealedRecord, seal_record
 from app.service.records.signing import SigningKey
 from app.service.restore import details as detail
 from app.service.restore.blocking import block_of
-from app.service.restore.log import Kept, RestoreLog, event, load, new_row, value_rows
+from app.service.restore.left import give_up, take_up
+from app.service.restore.log import Kept, RestoreLog, load, new_row, value_rows
 from app.service.restore.motor_given import note_motors
 from app.service.restore.order import Broken, Cause, Order, Timing
 from app.service.restore.prepare import Prepared, open_at, prepare
@@ -208,6 +209,23 @@ class Desk:
         async with self._starting:
             kept, transaction = await self._take_on(connection, restore_id, person, Kind.RESTORE_RESUMED)
             await self._run(kept, transaction, transaction.resume(), person)
+
+    async def give_up(self, restore_id: str, person: str, reason: str) -> None:
+        """An expert closes one that can neither be resumed nor rolled back, as its device is gone: the gate opens.
+
+        The rights are for the caller to check. Raises UsageError without a reason, RestoreUnknownError,
+        RestoreStateError, StoreError; then it stays open.
+        """
+        async with self._starting:
+            kept = await self.get(restore_id)
+            if self.running is not None or kept.row.state is not RestoreState.INCOMPLETE:
+                raise self._wrong_state(kept.row)
+            await give_up(self._store, kept, self._stamp, person, reason)
+            self._open.pop(restore_id, None)
+            self._shut()
+        details = {"station": kept.row.station, "restore": restore_id, "reason": reason.strip()}
+        self._journal.by(person).note(Kind.RESTORE_GIVEN_UP, None, **details)
+        await self.record(restore_id)
 
     async def _take_on(
         self, connection: Connection | None, restore_id: str, person: str, kind: Kind
@@ -389,22 +407,3 @@ _KIND_OF: Final[Mapping[End, Kind]] = {
     End.OLD: Kind.RESTORE_ROLLED_BACK,
     End.INCOMPLETE: Kind.RESTORE_INCOMPLETE,
 }
-
-
-def take_up(connection: Any, now_ns: int) -> list[RestoreRow]:
-    """What an earlier run left open is incomplete from now on: its tool ended, and its deadline with it."""
-    found = []
-    for row in rows.open_restores(connection):
-        if row.state is not RestoreState.INCOMPLETE:
-            row = replace(row, state=RestoreState.INCOMPLETE, outcome=_ended_with_its_tool(row, now_ns))
-            rows.put_state(connection, row.id, row.state, row.outcome)
-        found.append(row)
-    return found
-
-
-def _ended_with_its_tool(row: RestoreRow, now_ns: int) -> str:
-    outcome = json.loads(row.outcome)
-    cause = Cause.TOOL_ENDED
-    told = event(now_ns, f"journal.{Kind.RESTORE_INCOMPLETE.value}", station=row.station, cause_key=cause.text_key)
-    outcome |= {"cause": cause.value, "in_state": row.state.value, "events": [*outcome.get("events", ()), told]}
-    return json.dumps(outcome, ensure_ascii=False)

@@ -35,7 +35,11 @@ from app.service.restore.log import Kept, raw_of
 from app.service.restore.order import Cause, Objection
 from app.store.restore_rows import Direction, RestoreState, StepRow, StepState
 
-_OUTCOMES: Final = {RestoreState.DONE: Outcome.NEW, RestoreState.ROLLED_BACK: Outcome.OLD}
+_OUTCOMES: Final = {
+    RestoreState.DONE: Outcome.NEW,
+    RestoreState.ROLLED_BACK: Outcome.OLD,
+    RestoreState.GIVEN_UP: Outcome.GIVEN_UP,
+}
 _STEPS: Final = {
     StepState.DONE: StepOutcome.DONE,
     StepState.FAILED: StepOutcome.FAILED,

@@ -12,7 +12,8 @@ from app.web.models.visits import Remark, WorkOrder
 
 Slug = Annotated[str, Field(max_length=200)]
 StepKindName = Literal["write", "auxiliary", "confirm", "save", "restart", "prove"]
-EndName = Literal["new", "old", "incomplete"]
+EndName = Literal["new", "old", "incomplete", "given-up"]
+WayName = Literal["confirm", "roll-back", "resume", "give-up"]
 StateName = Literal[
     "writing",
     "awaiting-confirmation",
@@ -23,6 +24,7 @@ StateName = Literal[
     "rolling-back",
     "rolled-back",
     "incomplete",
+    "given-up",
 ]
 
 
@@ -66,6 +68,14 @@ class RestoreRequest(RestorePlanRequest):
     reason: Remark = ""
     work_order: WorkOrder = ""
     confirm_s: Annotated[float, Field(ge=5, le=3_600)] = 300
+
+
+class GiveUpRequest(BaseModel):
+    """Why a restore is closed although the station may hold old and new values."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    reason: Annotated[str, Field(min_length=3, max_length=500, pattern=r"\S")]
 
 
 class RestoreRefusal(BaseModel):
@@ -216,7 +226,7 @@ class RestoreDoc(RestoreHead):
     done: int
     total: int
     blocks: bool
-    can: list[Literal["confirm", "roll-back", "resume"]]
+    can: list[WayName]
     cause_device: str | None
     cause_details: dict[str, str]
     error: Failure | None

@@ -36,6 +36,7 @@ from app.web.models.restore import (
     RestoreSource,
     RestoreStepDoc,
     RestoreValue,
+    WayName,
 )
 
 ValueState = Literal["equal", "waiting", "intended", "done", "failed", "unknown"]
@@ -46,6 +47,7 @@ _ENDS: Final[Mapping[RestoreState, EndName]] = {
     RestoreState.DONE: "new",
     RestoreState.ROLLED_BACK: "old",
     RestoreState.INCOMPLETE: "incomplete",
+    RestoreState.GIVEN_UP: "given-up",
 }
 
 
@@ -203,9 +205,9 @@ def restore_doc(kept: Kept, desk: Desk, descriptions: Descriptions) -> RestoreDo
     )
 
 
-def _can(state: RestoreState, transaction: Transaction | None) -> list[Literal["confirm", "roll-back", "resume"]]:
+def _can(state: RestoreState, transaction: Transaction | None) -> list[WayName]:
     if transaction is None:
-        return ["resume", "roll-back"] if state is RestoreState.INCOMPLETE else []
+        return ["resume", "roll-back", "give-up"] if state is RestoreState.INCOMPLETE else []
     if state is RestoreState.AWAITING_CONFIRMATION:
         return ["confirm", "roll-back"]
     on_its_way = not state.ended and state not in (RestoreState.ROLLING_BACK, RestoreState.INCOMPLETE)

@@ -21,7 +21,14 @@ from app.service.restore.survey import targets_of
 from app.web.attachment import as_attachment
 from app.web.deps import BenchOf, ConnectionOf, PersonOf, needs
 from app.web.models import Nothing
-from app.web.models.restore import RestoreDoc, RestoreHead, RestorePlanDoc, RestorePlanRequest, RestoreRequest
+from app.web.models.restore import (
+    GiveUpRequest,
+    RestoreDoc,
+    RestoreHead,
+    RestorePlanDoc,
+    RestorePlanRequest,
+    RestoreRequest,
+)
 from app.web.models.restore_docs import descriptions_of, head_doc, plan_doc, restore_doc
 from app.web.problem import NotFoundError
 
@@ -87,6 +94,13 @@ async def roll_back_restore(bench: BenchOf, person: PersonOf, restore_id: str, _
 async def resume_restore(bench: BenchOf, person: PersonOf, restore_id: str, _request: Nothing) -> RestoreDoc:
     """On to the new values, from whatever is there."""
     await bench.restores.resume(bench.connection, restore_id, person.person)
+    return await _doc(bench, restore_id)
+
+
+@router.post("/live/restores/{restore_id}/give-up", dependencies=[needs(Role.EXPERT)])
+async def give_up_restore(bench: BenchOf, person: PersonOf, restore_id: str, request: GiveUpRequest) -> RestoreDoc:
+    """Close one that can be neither resumed nor rolled back; its station takes writes again, as it is."""
+    await bench.restores.give_up(restore_id, person.person, request.reason)
     return await _doc(bench, restore_id)
 
 

@@ -18,7 +18,8 @@ export type RestoreHead = Schemas["RestoreHead"];
 export type RestoreDoc = Schemas["RestoreDoc"];
 export type RestoreValue = Schemas["RestoreValue"];
 export type RestoreStep = Schemas["RestoreStepDoc"];
-export type Way = RestoreDoc["can"][number];
+/** What a person orders without giving a reason. */
+export type Way = Exclude<RestoreDoc["can"][number], "give-up">;
 
 const RUN_POLL_MS = 400;
 const WATCH_MS = 3000;
@@ -43,8 +44,12 @@ const pathOf = (id: string) => `/api/live/restores/${encodeURIComponent(id)}`;
 export const takeWay = (id: string, way: Way): Promise<RestoreDoc> =>
   send("POST", `${pathOf(id)}/${way}`, {});
 
+export const giveUp = (id: string, reason: string): Promise<RestoreDoc> =>
+  send("POST", `${pathOf(id)}/give-up`, { reason });
+
 /** True where somebody must still look after it: it runs, waits for a person, or was cut off. */
-export const isOpen = ({ state }: RestoreHead): boolean => state !== "done" && state !== "rolled-back";
+export const isOpen = ({ state }: RestoreHead): boolean =>
+  state !== "done" && state !== "rolled-back" && state !== "given-up";
 
 export const restoresQuery = queryOptions({
   queryKey: ["restores"],

@@ -9,11 +9,12 @@ from itertools import count
 
 import pytest
 
-from app.errors import RestoreChangedError, RestoreOpenError, RestoreStateError
+from app.errors import RestoreChangedError, RestoreOpenError, RestoreStateError, UsageError
 from app.model.address import parse_address
 from app.model.description import Verify
 from app.model.fault import FaultOrder
 from app.service.journal import Entry, Kind
+from app.service.records.restore_record import Outcome
 from app.service.restore.order import Cause, Objection
 from app.service.restore.survey import boots_of
 from app.service.restore.transaction import End
@@ -407,6 +408,34 @@ async def test_who_takes_it_up_again_finds_the_station_fit(bench: Bench, served:
     assert await bench.desk.wait(restore_id) is End.OLD
     end_it()
     connection.recording = recording
+
+
+async def test_an_expert_gives_up_what_can_never_be_finished(bench: Bench, served: Served) -> None:
+    """Its device is gone for good: the gate opens for a reason that is audited, and the record says what that means."""
+    served.spoil(Fault(download_of(11, "6065"), _cut(served)))
+    restore_id, end = await bench.run()
+    assert end is End.INCOMPLETE
+    await bench.until_connected()
+    connection, target = bench.connection, bench.connection.target(PMM)
+    driver = connection.driver(target)
+    with pytest.raises(UsageError):
+        await bench.desk.give_up(restore_id, "Berta", "  ")
+    with pytest.raises(RestoreOpenError):
+        await write_raw(driver, target, parse_address("3110:01"), 480, connection.journal)
+    await bench.desk.give_up(restore_id, "Berta", "PMC exchanged")
+    assert bench.desk.open == ()
+    assert (await write_raw(driver, target, parse_address("3110:01"), 480, connection.journal)).verified
+    told = next(entry for entry in connection.journal.latest() if entry.kind is Kind.RESTORE_GIVEN_UP)
+    assert (told.person, told.details["reason"]) == ("Berta", "PMC exchanged")
+    kept = await bench.desk.get(restore_id)
+    assert (kept.row.state, kept.outcome["given_up_by"]) == (RestoreState.GIVEN_UP, "Berta")
+    sealed = await bench.desk.record(restore_id)
+    assert sealed is not None and sealed.record.outcome is Outcome.GIVEN_UP
+    assert any(one.details.get("reason") == "PMC exchanged" for one in sealed.record.events)
+    for again in (bench.desk.resume, bench.desk.roll_back):
+        with pytest.raises(RestoreStateError):
+            await again(connection, restore_id, "Berta")
+    assert bench.another_desk().open == (), "nor for the next run of the tool"
 
 
 async def test_a_recording_that_ends_halts_the_restore(bench: Bench) -> None:

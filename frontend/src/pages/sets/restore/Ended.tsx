@@ -16,11 +16,13 @@ import { useStationName } from "./names";
 import { Cause } from "./RestoreRun";
 import classes from "./Restore.module.css";
 import { WaysOut } from "./Decision";
+import { GiveUp } from "./GiveUp";
 
 const LOOKS = {
   new: { Icon: IconCircleCheck, tone: "tone-ok" },
   old: { Icon: IconArrowBackUp, tone: "tone-warning" },
   incomplete: { Icon: IconAlertOctagon, tone: "tone-error" },
+  "given-up": { Icon: IconAlertOctagon, tone: "tone-warning" },
 } as const;
 
 const RECORDS = [
@@ -47,7 +49,14 @@ export function Ended({ doc }: { doc: RestoreDoc }) {
         {doc.end !== "new" && <Cause doc={doc} />}
         <p className="dim">{ranBy(doc, t)}</p>
       </div>
-      {doc.end === "incomplete" ? <WaysOut doc={doc} /> : <Links doc={doc} />}
+      {doc.end === "incomplete" ? (
+        <div className={classes.waysOut}>
+          <WaysOut doc={doc} />
+          <GiveUp doc={doc} station={station} />
+        </div>
+      ) : (
+        <Links doc={doc} />
+      )}
     </div>
   );
 }

@@ -43,6 +43,7 @@ const NONE: RestoreHead[] = [];
 const LOOKS = {
   new: { Icon: IconCircleCheck, tone: "tone-ok" },
   old: { Icon: IconArrowBackUp, tone: "" },
+  "given-up": { Icon: IconAlertOctagon, tone: "tone-warning" },
   incomplete: { Icon: IconAlertOctagon, tone: "tone-error" },
 } as const;
 const RUNNING = { Icon: IconLoader2, tone: "tone-warning" };
