@@ -72,9 +72,7 @@ function GiveUpDialog({ doc, station, onClose }: Props & { onClose: () => void }
           data-autofocus
           data-testid="give-up-reason"
         />
-        {order.error && (
-          <ProblemAlert error={order.error} title={t("page.restoring.way_failed.give-up")} />
-        )}
+        {order.error && <ProblemAlert error={order.error} title={t("page.restoring.way_failed.give-up")} />}
         <HoldButton
           tone="danger"
           hint={t("page.hold")}
