@@ -69,18 +69,11 @@ def found_sets(page: Page) -> str:
 
 def passing_plan(page: Page, order: dict[str, Any]) -> dict[str, Any]:
     """The plan, once nothing speaks against it any more."""
-    plan: dict[str, Any] = page.wait_for_function(
-        """async (order) => {
-            const headers = { "content-type": "application/json" };
-            const sent = { method: "POST", headers, body: JSON.stringify(order) };
-            const plan = await (await fetch("/api/live/restore/plan", sent)).json();
-            return plan.refusals?.length === 0 && plan;
-        }""",
-        arg=order,
-        timeout=RUN_MS,
-        polling=500,
-    ).json_value()
-    return plan
+    for _ in range(20):
+        plan: dict[str, Any] = api(page, "POST", "/api/live/restore/plan", order)
+        if not plan["refusals"]:
+            return plan
+    raise AssertionError(plan["refusals"])
 
 
 def disturb(page: Page, changes: tuple[tuple[str, str, int], ...] = CHANGED) -> None:
@@ -186,7 +179,7 @@ def test_what_nobody_confirms_is_put_back_and_said_so_in_german(page: Page, demo
 
 
 def test_an_expert_restores_as_one_only_by_choice_and_what_is_mended_is_told(page: Page, demo: str, sets: str) -> None:
-    """The last one on this demo: once there is a user, the session of the launch is over."""
+    """From here on there is a user, and the session of the launch is over."""
     page.goto(tab(demo))
     api(page, "POST", "/api/live/stop", {})
     disturb(page, ((PMC, "6510:04", 410),))
@@ -209,6 +202,31 @@ def test_an_expert_restores_as_one_only_by_choice_and_what_is_mended_is_told(pag
     assert json.loads(asked.value.post_data or "")["expert"] is True
     expect(switch).to_be_checked()
     assert problems(page) == []
+
+
+def test_a_stop_halts_a_restore_and_an_expert_gives_it_up(page: Page, demo: str, sets: str) -> None:
+    """Pressed while the devices save: nothing is restarted, nothing rolled back, until a person decides."""
+    page.goto(tab(demo))
+    api(page, "POST", "/api/live/stop", {})
+    disturb(page, ((PMM, "3110:01", 480),))
+    order = {"station": TARGET, "sets": sets.split(","), "restart": True}
+    plan = passing_plan(page, order)
+    begun = api(page, "POST", "/api/live/restore", {**order, "plan_hash": plan["hash"]})
+    page.goto(tab(demo, f"restore={begun['id']}"))
+    expect(page.get_by_test_id("restore-confirm")).to_be_visible(timeout=RUN_MS)
+    path = f"/api/live/restores/{begun['id']}"
+    api(page, "POST", f"{path}/confirm", {})
+    api(page, "POST", "/api/live/stop", {})
+    expect(page.get_by_test_id("restore-end-incomplete")).to_be_visible(timeout=RUN_MS)
+    expect(page.get_by_test_id("restore-cause")).to_contain_text("STOP or FEATHER")
+    page.get_by_test_id("give-up-open").click()
+    expect(page.get_by_test_id("give-up-hold")).to_be_disabled()
+    page.get_by_test_id("give-up-reason").fill("PMM exchanged")
+    assert problems(page) == []
+    hold(page, "give-up-hold")
+    expect(page.get_by_test_id("restore-end-given-up")).to_contain_text("may hold old and new values")
+    assert api(page, "GET", path)["blocks"] is False
+    disturb(page, ((PMM, "3110:01", 490),))
 
 
 def problems(page: Page) -> list[str]:
