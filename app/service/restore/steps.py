@@ -161,7 +161,7 @@ class Hands:
         for slug, count in self._all_commands().items():
             if count != self._commands[slug]:
                 target = self.targets[slug]
-                raise OvertakenError(bus=target.device.bus, node=target.node, address=CONTROLWORD.short)
+                raise OvertakenError(bus=target.device.bus, node=target.node, address="reset node")
 
     def _all_commands(self) -> dict[str, int]:
         """How many urgent commands each device has got."""
