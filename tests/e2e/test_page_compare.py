@@ -324,5 +324,6 @@ def test_the_blades_are_compared_by_their_latest_sets_connected_or_not(home: Hom
         home.go("tab=blades")
         expect(page.get_by_test_id(f"parity-{ONE}")).to_contain_text("agrees with the others")
         expect(page.get_by_test_id("parity-of")).to_have_count(0)
+        expect(page.get_by_test_id("parity-turbine")).to_have_value("WTG-07")
     finally:
         home.ask("POST", "/api/live/connect", {"turbine": "wtg-07"})

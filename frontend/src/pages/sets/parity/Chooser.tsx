@@ -19,7 +19,7 @@ export function Chooser({ parity, kind }: { parity: Parity; kind?: BladeKind }) 
     update({ turbine: slug ?? undefined, of: undefined, group: undefined, edit: undefined });
   return (
     <>
-      {(turbines.length > 1 || turbine === undefined) && (
+      {(turbines.length > 1 || !connected) && (
         <Select
           aria-label={t("page.parity.turbine")}
           placeholder={t("page.parity.turbine")}
