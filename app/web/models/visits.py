@@ -69,9 +69,9 @@ class VisitChange(BaseModel):
 
 
 class ChangedValue(BaseModel):
-    """A parameter that was ``was`` and is ``now``; the keys where an enumeration names that. ``person`` and ``t_ns`` are null where nobody saw the write.
+    """A parameter that was ``was`` and is ``now``; the keys where an enumeration names that.
 
-    ``person`` is empty where another master wrote it.
+    ``person`` and ``t_ns`` are null where nobody saw the write. ``person`` is empty where another master wrote it.
     """
 
     address: str

@@ -2413,9 +2413,9 @@ export interface components {
         };
         /**
          * ChangedValue
-         * @description A parameter that was ``was`` and is ``now``; the keys where an enumeration names that. ``person`` and ``t_ns`` are null where nobody saw the write.
+         * @description A parameter that was ``was`` and is ``now``; the keys where an enumeration names that.
          *
-         *     ``person`` is empty where another master wrote it.
+         *     ``person`` and ``t_ns`` are null where nobody saw the write. ``person`` is empty where another master wrote it.
          */
         ChangedValue: {
             /** Address */
