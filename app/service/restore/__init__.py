@@ -30,8 +30,8 @@ What each crash point leaves, and why both ways out lead out of it:
 * An axis that is driven meanwhile (STOP and FEATHER always go through, and so does the safety chain) ends the writing
   at once; a rollback waits until it stands, and at last leaves the decision to a person.
 * STOP or FEATHER, another master, or a recording that ends, halt it: INCOMPLETE, without a rollback that nobody asked
-  for. The commands are counted (``Driver.commanded``): neither a write of the controlword nor a restart follows one that
-  came after a person decided last.
+  for. The commands are counted (``Driver.commanded``): neither a write of the controlword nor a restart follows one
+  that came after a person decided last.
 * Whoever takes it up again finds the same devices and a fit station (``precheck``), else it stays INCOMPLETE.
 * What can never be finished, for its device is gone, an expert closes: GIVEN_UP, audited, with a reason.
 * A cable that was pulled, or a store that cannot be written, ends as INCOMPLETE without a rollback: a write that cannot
