@@ -9,9 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 from app.errors import (
+    ConsentError,
     DeviceError,
     HubsideError,
     NoAnswerError,
+    OvertakenError,
     RefusedError,
     RestoreOpenError,
     RestoreRefusedError,
@@ -103,6 +105,8 @@ def next_step(error: HubsideError) -> str | None:
         (UsageError, "usage"),
         (RestoreOpenError, "restore_open"),
         (RestoreRefusedError, "restore_refused"),
+        (ConsentError, "consent"),
+        (OvertakenError, "overtaken"),
         (RefusedError, "refused"),
         (DeviceError, "device"),
         (NoAnswerError, "no_answer"),

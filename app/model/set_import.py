@@ -15,7 +15,10 @@ LARGEST: Final = 8 * 1024 * 1024
 
 
 def read_set_file(data: bytes, file: str, taking: Taking) -> Imported:
-    """Read a JSON set, a DCF or a CSV, whatever its name ends with. Raises SetFileError; then nothing is taken."""
+    """Read a JSON set, a DCF or a CSV, by how it begins; where that says nothing, by how its name ends.
+
+    Raises SetFileError; then nothing is taken.
+    """
     if len(data) > LARGEST:
         raise SetFileError(file=file, line=1, reason=f"is larger than {LARGEST >> 20} MiB")
     start = data[:4096].removeprefix(b"\xef\xbb\xbf").lstrip()
@@ -28,6 +31,6 @@ def read_set_file(data: bytes, file: str, taking: Taking) -> Imported:
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
         raise SetFileError(file=file, line=line, reason="bytes that are no UTF-8") from error
-    if start.startswith((b"{", b"[")):
+    if start.startswith((b"{", b"[")) or file.lower().endswith(".json"):
         return Imported(load_set(text, file))
     return load_csv(text, file, taking)

@@ -175,3 +175,9 @@ def test_whatever_is_done_to_our_own_file_the_same_set_comes_of_it_or_none(data:
         assert error.details["line"] >= 1
     else:
         assert read.parameters.hash == parameters.hash
+
+
+def test_a_file_that_calls_itself_json_is_judged_as_such() -> None:
+    with pytest.raises(SetFileError) as caught:
+        read_set_file(b"no set", "x.json", taking())
+    assert caught.value.details["reason"].startswith("no valid JSON")
