@@ -6,7 +6,7 @@ import argparse
 import time
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
-from typing import Any
+from typing import Any, Final
 
 from app.cli.output import Output
 from app.service.journal import Journal
@@ -17,6 +17,9 @@ from app.store import restore_rows
 from app.store.restore_rows import RestoreRow, RestoreState
 from app.store.store import Store
 from app.wire.frame import Stamper
+
+MOST: Final = 100_000
+"""Restores that are listed: all."""
 
 
 @asynccontextmanager
@@ -37,7 +40,7 @@ async def list_restores(arguments: argparse.Namespace, output: Output) -> int:
     """All of them, newest first."""
     store = Store.open(arguments.settings.data)
     try:
-        rows = await store.run(restore_rows.list_restores)
+        rows = await store.run(lambda kept: restore_rows.list_restores(kept, None, MOST))
     finally:
         store.close()
     if output.as_json:

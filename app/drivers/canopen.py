@@ -251,7 +251,7 @@ class CanOpenDriver:
         """See Driver. By SDO download; a write to 1010h or 1011h waits at least 10 s for its acknowledge."""
         self._require_active(node, asked=not urgent)
         if urgent:
-            self._commands.note(node, address)
+            known = self._commands.note(node, address)
         wait_ns = _timeout_ns(timeout_s, self._timeouts_ns.get(node, {}).get(address))
         if address.major in _SLOW:
             wait_ns = max(wait_ns, SAVE_TIMEOUT_NS)

@@ -24,10 +24,14 @@ class UrgentCommands:
         """How many there were so far."""
         return self._counts.get((node, address), 0)
 
-    def note(self, node: int, address: Address) -> None:
-        """One is about to be sent. Once this returns, no write that did not know of it leaves any more."""
+    def note(self, node: int, address: Address) -> int:
+        """One is about to be sent; gives its number. From now on no write leaves any more that did not know of it.
+
+        Nor does an earlier command: with its own number as what it knows, it gives way to the newer one.
+        """
         with self._lock:
-            self._counts[node, address] = self.count(node, address) + 1
+            number = self._counts[node, address] = self.count(node, address) + 1
+        return number
 
     def send_unless(self, node: int, address: Address, known: int, send: Callable[[], None]) -> bool:
         """Call ``send`` and give True; False, and nothing is sent, where there were more commands than ``known``."""

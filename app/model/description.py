@@ -195,7 +195,8 @@ class Entry:
     ``default``, ``minimum``, ``maximum`` and ``also`` (values allowed beyond the limits) are raw values. Where
     ``node_id``, the node's number is added to the default ($NODEID of CiA 306). ``inferred`` marks what the manual does
     not print; ``motion`` an object whose write can set an axis in motion; ``counts`` one that the device itself counts
-    on, so that no old value is put back. ``line`` is the row's line in its file.
+    on, so that no old value is put back. An emergency feather command puts the value of ``overwritten_by`` into it, in
+    RAM. ``line`` is the row's line in its file.
     """
 
     address: Address
@@ -229,6 +230,7 @@ class Entry:
     node_id: bool = False
     motion: bool = False
     counts: bool = False
+    overwritten_by: Address | None = None
     line: int = 0
 
     @property

@@ -58,7 +58,8 @@ _TOP_KEYS: Final = frozenset(
 _OWN_KEYS: Final = frozenset(("index", "ind", "pnu", "kind", "subs", "elements"))
 _ROW_KEYS: Final = frozenset(
     "name section group type access pdo default saved save_category unit scale hex unit_from min max enumeration bits "
-    "restore verify requires mirror by_variant note inferred timeout_s node_id motion also counts".split()
+    "restore verify requires mirror by_variant note inferred timeout_s node_id motion also counts "
+    "overwritten_by".split()
 )
 _NOT_INHERITED_BY_SUB0: Final = _ROW_KEYS - {"section", "group", "saved", "save_category", "inferred"}
 _E = TypeVar("_E", bound=Enum)
@@ -262,6 +263,7 @@ class _Reader:
             node_id=_bool(row, "node_id"),
             motion=_bool(row, "motion"),
             counts=_bool(row, "counts"),
+            overwritten_by=parse_address(row["overwritten_by"]) if "overwritten_by" in row else None,
             line=line,
         )
 

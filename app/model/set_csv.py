@@ -179,7 +179,10 @@ def _raw(text: str) -> Raw:
 
 
 def _json_text(text: str) -> str:
-    found = json.loads(text)
+    try:
+        found = json.loads(text)
+    except RecursionError as error:
+        raise ValueError(text[:40]) from error
     if not isinstance(found, str):
         raise ValueError(text)
     found.encode()  # half a character is none: UnicodeEncodeError is a ValueError

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from app.drivers.contract import Driver
-from app.errors import BusLostError
+from app.errors import NoAnswerError
 from app.model.address import Address
 from app.model.datatypes import Raw, decode_raw
 from app.model.description import Description, Entry
@@ -49,19 +49,19 @@ class Target:
     async def pass_gate(self, driver: Driver) -> None:
         """Raises RestoreOpenError where a restore of the device is not finished.
 
-        Its identity is read for that where nobody has seen it yet. Raises BusLostError, ConsentError.
+        Its identity is read for that where nobody has seen it yet. Raises NoAnswerError, BusLostError, ConsentError.
         """
         await self.gate.check(self.device, lambda: self._identity(driver))
 
     async def _identity(self, driver: Driver) -> Identity:
-        """What the device says of itself; nothing where it does not answer."""
+        """What the device says of itself. Raises NoAnswerError."""
         wanted = [address for address in _WHO if address in self.description.entries]
         unknown = [address for address in wanted if self.lookup(address) is None]
         found = {address: raw for address in wanted if (raw := self.lookup(address)) is not None}
         for address, answer in (await driver.read_many(self.node, unknown)).items() if unknown else ():
             if isinstance(answer, bytes):
                 found[address] = decode(self.entry(address), answer)
-            elif isinstance(answer, BusLostError):
+            elif isinstance(answer, NoAnswerError):  # one that only refuses has none to tell
                 raise answer
         return identity_of(found)
 

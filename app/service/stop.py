@@ -16,7 +16,7 @@ from enum import Enum
 from typing import Final
 
 from app.drivers.contract import Driver
-from app.errors import HubsideError
+from app.errors import HubsideError, OvertakenError
 from app.model.address import Address
 from app.model.description import Verify
 from app.service.devices import Target, decode
@@ -38,6 +38,8 @@ class Path(Enum):
 
     RPDO = "rpdo"
     SDO = "sdo"
+    REPLACED = "replaced"
+    """Not sent: a newer command came first."""
     FAILED = "failed"
 
 
@@ -88,6 +90,8 @@ async def _command(axis: Axis, command: Command, now_ns: Callable[[], int]) -> A
             await driver.write(target.node, CONTROLWORD, data, verify=Verify.ACK, urgent=True)
             how = Path.SDO
         confirmed = await _confirmed(driver, target, command)
+    except OvertakenError:
+        return AxisOutcome(target.slug, Path.REPLACED, sent_t_ns, None)
     except HubsideError as error:
         return AxisOutcome(target.slug, Path.FAILED, sent_t_ns, None, error)
     return AxisOutcome(target.slug, how, sent_t_ns, now_ns() if confirmed else None)

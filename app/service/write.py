@@ -80,6 +80,7 @@ async def write_raw(
             found=_shown(target, entry, was),
         )
     shown = {"address": address.short, "name": entry.title, "was": _shown(target, entry, was)}
+    await target.pass_gate(driver)  # once more: what was read meanwhile took its time
     try:
         how = await driver.write(target.node, address, data, entry.timeout_s, entry.verify, known=known)
         read = await _read_back(driver, target, entry, data)

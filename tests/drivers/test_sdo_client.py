@@ -385,6 +385,22 @@ def test_what_waits_for_a_fence_does_not_follow_it_either() -> None:
     assert device.written == [(WINDOW, 6)]
 
 
+def test_an_earlier_command_gives_way_to_a_newer_one() -> None:
+    """A STOP that waits for a slow node does not follow the FEATHER that went by PDO meanwhile."""
+    rig = Rig()
+    device = rig.node()
+    device.watch_writes(WINDOW)
+    rig.client.submit(11, Job(read_steps(11, {POSITION: DEFAULT_TIMEOUT_NS}, {}, rig.client.counters), Outcome(), True))
+    outcome, known = Outcome(), rig.client.commands.note(11, WINDOW)
+    counters = rig.client.counters
+    steps = write_steps(11, WINDOW, u32(5), DEFAULT_TIMEOUT_NS, DEFAULT_TIMEOUT_NS, Verify.ACK, counters, known=known)
+    rig.client.submit(11, Job(steps, outcome, urgent=True))
+    rig.client.commands.note(11, WINDOW)
+    rig.run_until(lambda: outcome.done)
+    assert isinstance(outcome.error, OvertakenError)
+    assert device.written == []
+
+
 def test_a_write_that_nothing_has_overtaken_is_sent() -> None:
     rig = Rig()
     device = rig.node()

@@ -23,6 +23,8 @@ class Why(Enum):
     """Why an object is not restored; the value is the end of its text key ``restore.why.…``."""
 
     NOT_SELECTED = "not-selected"
+    LEFT_BY_FEATHER = "left-by-feather"
+    """Not selected, and RAM may hold what an emergency feather command has put there: a save makes that permanent."""
     NOT_IN_SET = "not-in-set"
     NOT_ON_DEVICE = "not-on-device"
     NEVER = "never"

@@ -68,6 +68,9 @@ def _refusal(
     if misfit is not None:
         return Why.MISFIT, {"error_key": misfit.text_key} | {key: str(value) for key, value in misfit.details.items()}
     if options.selected is not None and Place(device.slug, entry.address) not in options.selected:
+        source = entry.overwritten_by
+        if source is not None and device.values[entry.address] == device.values.get(source):
+            return Why.LEFT_BY_FEATHER, {"source": source.short}
         return Why.NOT_SELECTED, {}
     return None, {}
 

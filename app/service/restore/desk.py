@@ -36,7 +36,8 @@ from app.service.records.files import SealedRecord, seal_record
 from app.service.records.signing import SigningKey
 from app.service.restore import details as detail
 from app.service.restore.blocking import block_of
-from app.service.restore.left import give_up, take_up
+from app.service.restore.commands import Counts, commands_of
+from app.service.restore.left import give_up, require_same_places, take_up
 from app.service.restore.log import Kept, RestoreLog, load, new_row, value_rows
 from app.service.restore.motor_given import note_motors
 from app.service.restore.order import Broken, Cause, Order, Timing
@@ -173,7 +174,7 @@ class Desk:
         self._shut()
         self._journal.by(order.person).note(Kind.RESTORE_BEGUN, None, station=order.station, restore=restore_id)
         kept = Kept(row, tuple(values), ())
-        transaction = self._transaction(connection, kept, order.person, prepared.targets)
+        transaction = self._transaction(connection, kept, order.person, prepared.targets, prepared.commands)
         transaction.found = prepared.found
         await self._run(kept, transaction, transaction.forward(prepared.plan, order.confirm_s), order.person)
         return restore_id
@@ -196,18 +197,21 @@ class Desk:
 
         Raises RestoreUnknownError, RestoreStateError, UsageError where its station is not connected.
         """
+        commands = None if connection is None else commands_of(connection)
         transaction = self.at_work(restore_id)
-        if transaction is not None:
+        if transaction is not None and transaction.goes_on:
             transaction.turn_back(person)
             return
+        await self._settle()
         async with self._starting:
-            kept, transaction = await self._take_on(connection, restore_id, person, Kind.RESTORE_TURNED_BACK)
+            kept, transaction = await self._take_on(connection, restore_id, person, Kind.RESTORE_TURNED_BACK, commands)
             await self._run(kept, transaction, transaction.back(), person)
 
     async def resume(self, connection: Connection | None, restore_id: str, person: str) -> None:
         """On to the new values. Raises RestoreUnknownError, RestoreStateError, UsageError."""
+        commands = None if connection is None else commands_of(connection)
         async with self._starting:
-            kept, transaction = await self._take_on(connection, restore_id, person, Kind.RESTORE_RESUMED)
+            kept, transaction = await self._take_on(connection, restore_id, person, Kind.RESTORE_RESUMED, commands)
             await self._run(kept, transaction, transaction.resume(), person)
 
     async def give_up(self, restore_id: str, person: str, reason: str) -> None:
@@ -228,7 +232,7 @@ class Desk:
         await self.record(restore_id)
 
     async def _take_on(
-        self, connection: Connection | None, restore_id: str, person: str, kind: Kind
+        self, connection: Connection | None, restore_id: str, person: str, kind: Kind, commands: Counts | None
     ) -> tuple[Kept, Transaction]:
         kept = await self.get(restore_id)
         if self.running is not None or kept.row.state is not RestoreState.INCOMPLETE:
@@ -239,20 +243,28 @@ class Desk:
         targets = tuple(target for target in targets_of(connection, kept.row.station) if target.slug in slugs)
         if len(targets) != len(slugs):
             raise UsageError(reason=f"not all devices of the restore are there: {', '.join(sorted(slugs))}")
+        require_same_places(connection, kept, targets)
         self._journal.by(person).note(kind, None, station=kept.row.station, restore=restore_id)
-        return kept, self._transaction(connection, kept, person, targets)
+        return kept, self._transaction(connection, kept, person, targets, commands)
 
     def _wrong_state(self, row: RestoreRow) -> RestoreStateError:
         return RestoreStateError(restore=row.id, station=row.station, state_key=row.state.text_key)
 
     # -- run ----------------------------------------------------------------------------
 
-    def _transaction(self, connection: Connection, kept: Kept, person: str, targets: tuple[Target, ...]) -> Transaction:
+    def _transaction(
+        self,
+        connection: Connection,
+        kept: Kept,
+        person: str,
+        targets: tuple[Target, ...],
+        commands: Counts | None,
+    ) -> Transaction:
         details = kept.details
         log = RestoreLog(self._store, kept, self._stamp)
         ungated = {target.slug: replace(target, gate=OPEN) for target in targets}
         journal = self._journal.by(person)
-        hands = Hands(connection, ungated, log, journal, details["expert"], self._timing, self._monotonic)
+        hands = Hands(connection, ungated, log, journal, details["expert"], self._timing, self._monotonic, commands)
         terms = Terms(
             goals=kept.goals,
             modes=details["modes"],

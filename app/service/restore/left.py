@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Any
 
 from app.errors import UsageError
+from app.service.connection import Connection
+from app.service.devices import Target
+from app.service.gate import BARE_TURBINE, adapter_of
 from app.service.journal import Kind
 from app.service.restore.log import Kept, RestoreLog, event
 from app.service.restore.order import Broken, Cause
@@ -27,6 +30,18 @@ async def give_up(store: Store, kept: Kept, stamp: Callable[[], int], person: st
         await log.enter(RestoreState.GIVEN_UP, given_up_by=person, given_up_reason=why)
     except Broken as broken:
         raise broken.as_error(kept.row.station) from broken
+
+
+def require_same_places(connection: Connection, kept: Kept, targets: Iterable[Target]) -> None:
+    """On a bus without names a device is known by its place. Raises UsageError where this is another one."""
+    if connection.turbine.slug != BARE_TURBINE:
+        return
+    adapters = {bus.name: adapter_of(bus.connection) for bus in connection.turbine.buses}
+    places = {one["slug"]: (adapter_of(one["adapter"]), one["node"]) for one in kept.details["devices"]}
+    for target in targets:
+        if places[target.slug] != (adapters[target.device.bus], target.node):
+            adapter, node = places[target.slug]
+            raise UsageError(reason=f"the restore is of node {node} at {adapter}: connect to that one")
 
 
 def take_up(connection: Any, now_ns: int) -> list[RestoreRow]:

@@ -18,7 +18,7 @@ from app.service.connection import Connection
 from app.service.devices import Target
 from app.service.gate import BARE_TURBINE
 from app.service.restore.order import Given, Objection, Order, Refusal
-from app.service.restore.survey import STATUSWORD, VELOCITY, Survey, stage_on
+from app.service.restore.survey import STATUSWORD, VELOCITY, Survey, is_driven, read_integer, stage_on
 
 MASTER_QUIET_NS: Final = 10_000_000_000
 """A master that was seen within so long is at work."""
@@ -105,7 +105,7 @@ def is_other_device(then: Identity, now: Identity, nameplate: str | None) -> boo
     kinds = ((getattr(then, name), getattr(now, name)) for name in ("device_type", "vendor_id", "product_code"))
     if any(_differ(one, other) for one, other in kinds) or (then.serial or 0) != (now.serial or 0):
         return True
-    return not then.serial and _differ(then.nameplate, nameplate)
+    return not then.serial and then.nameplate is not None and then.nameplate != nameplate
 
 
 def is_other_firmware(then: Identity, now: Identity) -> bool:
@@ -181,6 +181,24 @@ async def objections_to_other_blades(connection: Connection, station: str) -> li
         if position is None or position > FEATHER_DEG:
             shown = "–" if position is None else f"{position:.2f}"
             found.append(Refusal(Objection.OTHER_BLADES, target.slug, {"missing": shown}))
+    return found
+
+
+async def objections_to_nameless_axes(connection: Connection, targets: Iterable[Target]) -> list[Refusal]:
+    """On a bus without names, axes that are driven: each of them may belong to the devices of the restore."""
+    if connection.turbine.slug != BARE_TURBINE:
+        return []
+    known, found = {target.slug for target in targets}, []
+    for axis in connection.axes():
+        if axis.target.slug in known:
+            continue
+        try:
+            status = await read_integer(connection, axis.target, STATUSWORD)
+        except NoAnswerError:
+            found.append(Refusal(Objection.DRIVE_UNKNOWN, axis.target.slug))
+        else:
+            if status is not None and is_driven(status):
+                found.append(Refusal(Objection.DRIVE_ENABLED, axis.target.slug, {"status": f"{status:04X}h"}))
     return found
 
 

@@ -16,6 +16,7 @@ from app.service.connection import Connection
 from app.service.devices import Target
 from app.service.gate import BARE_TURBINE
 from app.service.restore import precheck
+from app.service.restore.commands import Counts, commands_of
 from app.service.restore.order import Objection, Order, Refusal
 from app.service.restore.survey import Progress, Survey, survey, targets_of
 
@@ -31,6 +32,8 @@ class Prepared:
     same_unit: Mapping[str, bool]
     refusals: tuple[Refusal, ...]
     hash: str
+    commands: Counts
+    """STOP and FEATHER that were sent before it was ordered."""
 
     @property
     def goals(self) -> dict[Place, tuple[Raw, Raw]]:
@@ -52,6 +55,7 @@ async def prepare(
 
     Raises UsageError (no such station or device), NoAnswerError, BusLostError, ConsentError.
     """
+    commands = commands_of(connection)
     targets = targets_in(connection, order)
     found = await survey(connection, targets, order.person, order.reason, on_progress)
     same_unit = {
@@ -67,10 +71,11 @@ async def prepare(
         *precheck.objections_to_state(found),
         *precheck.objections_to_surroundings(connection, connection.stamper()),
         *precheck.objections_to_plan(plan),
+        *await precheck.objections_to_nameless_axes(connection, targets),
     ]
     if not (order.others_confirmed and order.expert):
         refusals += await precheck.objections_to_other_blades(connection, order.station)
-    return Prepared(order, targets, found, plan, same_unit, tuple(refusals), _hash(order, plan, found))
+    return Prepared(order, targets, found, plan, same_unit, tuple(refusals), _hash(order, plan, found), commands)
 
 
 def open_at(connection: Connection, targets: Iterable[Target], found: Survey) -> str | None:

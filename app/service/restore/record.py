@@ -141,7 +141,8 @@ class RecordOf:
     def _rows(self) -> Iterator[RowRecord]:
         saved, restarted = self._done(StepKind.SAVE), self._done(StepKind.RESTART)
         writes = {(device, address) for device, address in self._details["writes"]}
-        reached = self._kept.row.state.ended
+        reached = self._kept.row.state in (RestoreState.DONE, RestoreState.ROLLED_BACK)
+        unproven = {(device, str(parse_address(address))) for device, address in self._outcome.get("unproven", ())}
         for one in self._kept.values:
             write = (one.device, one.address) in writes
             yield self._row(
@@ -152,7 +153,7 @@ class RecordOf:
                 raw_of(one.wanted),
                 verified=reached,
                 saved=reached and one.device in saved,
-                proven=reached and one.device in saved & restarted,
+                proven=reached and one.device in saved & restarted and (one.device, one.address) not in unproven,
             )
         for one in self._details["skipped"]:
             was, wanted = (_raw(one[name]) for name in ("now", "wanted"))

@@ -26,7 +26,9 @@ from app.model.restore.plan import Step, StepKind
 from app.model.station import Place, StationValues
 from app.service.connection import Connection
 from app.service.devices import Target
+from app.service.gate import BARE_TURBINE
 from app.service.journal import Journal
+from app.service.restore.commands import Counts, commands_of
 from app.service.restore.log import RestoreLog, raw_text
 from app.service.restore.order import Broken, Cause, Objection, Timing
 from app.service.restore.precheck import objections_to_surroundings
@@ -59,8 +61,9 @@ class Hands:
     """Carries out single steps at one station. Every method raises Broken, and nothing else that is expected.
 
     ``targets`` by slug pass no gate. ``now`` is what RAM is known to hold; the boots and reconnects of ``take`` are
-    those against which a hidden restart or a gap shows. STOP or FEATHER after ``decided`` ends what would undo it: a
-    write of the controlword, and a restart, which opens the safety chain.
+    those against which a hidden restart or a gap shows. STOP or FEATHER after a person's decision (``commands``, later
+    ``decided``) ends the way: above all no write of the controlword follows one, and no restart, which opens the safety
+    chain. ``turned_back``: a person wants the old values, so that no step leads forward any more.
     """
 
     def __init__(
@@ -72,6 +75,7 @@ class Hands:
         expert: bool,
         timing: Timing,
         monotonic: Callable[[], float] = time.monotonic,
+        commands: Counts | None = None,
     ) -> None:
         self.connection = connection
         self.targets = targets
@@ -83,7 +87,13 @@ class Hands:
         self._expert = expert
         self._boots: dict[str, int] = {}
         self._reconnects = self._all_reconnects()
-        self._commands = self._all_commands()
+        self._commands = commands_of(connection) if commands is None else commands
+        self.turned_back = False
+        known = set(targets)
+        others = (axis.target for axis in connection.axes() if axis.target.slug not in known)
+        bare = connection.turbine.slug == BARE_TURBINE
+        self._watched = (*targets.values(), *(others if bare else ()))
+        """Nobody says which nodes of a bus without names belong together: there all axes must stand."""
 
     def take(self, found: Survey) -> None:
         """Go on from what was just read."""
@@ -91,17 +101,18 @@ class Hands:
         self._boots = dict(found.boots)
         self._reconnects = self._all_reconnects()
 
-    def decided(self) -> None:
-        """A person wants it to go on, knowing what was commanded until now."""
-        self._commands = self._all_commands()
+    def decided(self, commands: Counts | None = None) -> None:
+        """A person wants it to go on, knowing of ``commands``; by default of all until now."""
+        self._commands = commands_of(self.connection) if commands is None else commands
 
     # -- what must hold --------------------------------------------------------------
 
     async def guard(self, direction: Direction) -> None:
-        """Nothing has restarted, no frame is missing, nobody else writes, all is recorded, no axis is driven."""
+        """Nothing was commanded, restarted or missed, nobody else writes, all is recorded, no axis is driven."""
+        self._not_overtaken()
         self.look_for_restarts()
         self._look_around(direction)
-        for target in self.targets.values():
+        for target in self._watched:
             if await self._is_driven(target):
                 raise Broken(Cause.DRIVE_ENABLED, target.slug)
 
@@ -131,7 +142,7 @@ class Hands:
     async def quiet(self) -> None:
         """Wait until no axis is driven: one that stands is not written to while it follows something."""
         until = self.monotonic() + self.timing.quiet_s
-        for target in self.targets.values():
+        for target in self._watched:
             while await self._is_driven(target, fresh=True):
                 if self.monotonic() > until:
                     raise Broken(Cause.DRIVE_ENABLED, target.slug)
@@ -140,7 +151,7 @@ class Hands:
     async def _still(self) -> None:
         """Wait until all axes stand: a restart opens the safety chain, and that of another device may drive ours."""
         until = self.monotonic() + self.timing.quiet_s
-        for target in self.targets.values():
+        for target in self._watched:
             while abs(await self._integer(target, VELOCITY) or 0) > STANDSTILL:
                 if self.monotonic() > until:
                     raise Broken(Cause.DRIVE_ENABLED, target.slug)
@@ -148,7 +159,7 @@ class Hands:
 
     async def _not_feathered(self, slug: str) -> None:
         """A FEATHER that somebody has sent is not cut short by a restart: it stands in the controlword."""
-        for target in self.targets.values():
+        for target in self._watched:
             if CONTROLWORD not in target.description.entries:
                 continue
             word = await self._integer(target, CONTROLWORD)
@@ -157,16 +168,19 @@ class Hands:
                 raise Broken(Cause.DRIVE_ENABLED, slug)
 
     def _not_overtaken(self) -> None:
-        """Nobody has sent STOP or FEATHER. Raises OvertakenError."""
-        for slug, count in self._all_commands().items():
-            if count != self._commands[slug]:
-                target = self.targets[slug]
-                raise OvertakenError(bus=target.device.bus, node=target.node, address="reset node")
+        """Nobody has sent STOP or FEATHER since a person decided last."""
+        for slug, count in commands_of(self.connection).items():
+            if count != self._commands.get(slug):
+                target = self.connection.target(slug)
+                error = OvertakenError(bus=target.device.bus, node=target.node, address=CONTROLWORD.short)
+                raise Broken(Cause.OVERTAKEN, slug, error)
 
-    def _all_commands(self) -> dict[str, int]:
-        """How many urgent commands each device has got."""
-        drivers = ((slug, target, self.connection.driver(target)) for slug, target in self.targets.items())
-        return {slug: driver.commanded(target.node, CONTROLWORD) for slug, target, driver in drivers}
+    def _sure(self, direction: Direction) -> None:
+        """At the last moment before a restart: nothing speaks against it."""
+        self._not_overtaken()
+        self._look_around(direction)
+        if self.turned_back and direction is not Direction.BACK:
+            raise Broken(Cause.CANCELLED)
 
     async def _integer(self, target: Target, address: Address) -> int | None:
         try:
@@ -229,6 +243,7 @@ class Hands:
                 await self._shows(target, step.until.address, step.raw)
         except HubsideError as error:
             self._log.ended(_state_after(error), error)
+            self._not_overtaken()
             raise Broken(cause_of(error), step.device, error) from error
         self.now = self.now.with_value(place, step.raw)
         read = None if done.read is None else raw_text(done.read)
@@ -258,11 +273,12 @@ class Hands:
                     self._journal,
                     allow=Allow.MOTION,
                     expected=word,
-                    known=self._commands[target.slug],
+                    known=self._commands.get(target.slug, 0),
                 )
             )
         except HubsideError as error:
             self._log.ended(_state_after(error), error)
+            self._not_overtaken()
             raise Broken(cause_of(error), target.slug, error) from error
         self._log.ended(StepState.DONE, how=done.how.value)
 
@@ -302,6 +318,7 @@ class Hands:
             took = await whole(save(self.connection.driver(target), target, self._journal, self.connection.stamper))
         except HubsideError as error:
             self._log.ended(_state_after(error), error)
+            self._not_overtaken()
             cause = cause_of(error)
             raise Broken(cause if not cause.allows_rollback else Cause.SAVE_FAILED, slug, error) from error
         self._log.ended(StepState.DONE, took_s=round(took.took_s, 3))
@@ -319,8 +336,11 @@ class Hands:
         driver, stamper = self.connection.driver(target), self.connection.stamper
         try:
             took = await whole(
-                restart(driver, target, self._journal, stamper, self.timing.boot_s, sure=self._not_overtaken)
+                restart(driver, target, self._journal, stamper, self.timing.boot_s, sure=lambda: self._sure(direction))
             )
+        except Broken:
+            self._log.ended(StepState.FAILED)
+            raise
         except HubsideError as error:
             self._log.ended(_state_after(error), error)
             raise Broken(cause_of(error), slug, error) from error
@@ -328,16 +348,32 @@ class Hands:
         self._log.ended(StepState.DONE, took_s=round(took.took_s, 3))
         self._boots[slug] = max(before + 1, boots_of(target))
 
-    async def prove(self, slug: str, goals: Mapping[Place, Raw], found: Survey, direction: Direction) -> None:
-        """What was read of the device at the end is what it was to hold."""
+    async def prove(
+        self, slug: str, goals: Mapping[Place, Raw], found: Survey, direction: Direction, restarted: bool
+    ) -> list[Address]:
+        """What was read of the device at the end is what it was to hold.
+
+        Gives what cannot be proven now: a restart opens the safety chain, and the emergency feather command that
+        follows puts its own values into some objects.
+        """
         await self._log.intend(direction, StepKind.PROVE, slug)
         wanted = {place.address: raw for place, raw in goals.items() if place.slug == slug}
+        values, description = found.sets[slug].values, self.targets[slug].description
+        hidden = [
+            address
+            for address, raw in wanted.items()
+            if restarted
+            and values.get(address) != raw
+            and (source := description.entry(address).overwritten_by) is not None
+            and values.get(address) == values.get(source)
+        ]
         try:
-            _compare(Cause.PROOF_FAILED, slug, wanted, found.sets[slug].values)
+            _compare(Cause.PROOF_FAILED, slug, {a: raw for a, raw in wanted.items() if a not in hidden}, values)
         except Broken as broken:
             self._log.ended(StepState.FAILED, differing=broken.details["differing"])
             raise
-        self._log.ended(StepState.DONE, values=len(wanted))
+        self._log.ended(StepState.DONE, values=len(wanted) - len(hidden))
+        return hidden
 
 
 def _compare(cause: Cause, slug: str, wanted: Mapping[Address, Raw], found: Mapping[Address, Raw]) -> None:

@@ -23,6 +23,7 @@ from app.model.sets import Identity
 from app.model.station import Place
 from app.service.journal import Kind
 from app.service.restore import precheck
+from app.service.restore.commands import Counts, commands_of
 from app.service.restore.log import RestoreLog, error_document
 from app.service.restore.order import Broken, Cause
 from app.service.restore.steps import LOOK_S, Hands, cause_of
@@ -82,7 +83,9 @@ class Transaction:
         self._decided = asyncio.Event()
         self._confirmed_by: str | None = None
         self._back_by: str | None = None
+        self._back_commands: Counts | None = None
         self._deadline: float | None = None
+        self._returning = False
         self._ordered = False
         """A person has taken it up after an interruption: whether the station is fit is not known."""
 
@@ -99,6 +102,11 @@ class Transaction:
         return self._log.state
 
     @property
+    def goes_on(self) -> bool:
+        """False once it has come to an end, which is only kept now."""
+        return not self._log.state.ended and self._log.state is not RestoreState.INCOMPLETE
+
+    @property
     def left_s(self) -> float | None:
         """Seconds until all is rolled back for want of a confirmation; None where none is awaited."""
         if self._deadline is None or self._log.state is not RestoreState.AWAITING_CONFIRMATION:
@@ -110,12 +118,14 @@ class Transaction:
         if not self.left_s or self._decided.is_set():
             return False
         self._confirmed_by = person
+        self._hands.decided()
         self._decided.set()
         return True
 
     def turn_back(self, person: str) -> None:
-        """A person wants the old values: after the step that runs now."""
-        self._hands.decided()
+        """A person wants the old values: after the step that runs now, knowing what was commanded until now."""
+        self._back_commands = commands_of(self._hands.connection)
+        self._hands.turned_back = True
         self._back_by = person
         self._decided.set()
 
@@ -145,8 +155,9 @@ class Transaction:
             return await way
         except Broken as broken:
             self.broken = self.broken or broken
-            wanted_back = broken.cause is Cause.CANCELLED
-            if not (falls_back or wanted_back) or not broken.cause.allows_rollback:
+            overtaken = broken.cause is Cause.OVERTAKEN and self._back_by is not None and not self._returning
+            wanted_back = broken.cause is Cause.CANCELLED or overtaken
+            if not (falls_back or wanted_back) or not (broken.cause.allows_rollback or overtaken):
                 return await self._incomplete(broken)
         except asyncio.CancelledError:
             await asyncio.shield(self._incomplete(Broken(Cause.TOOL_ENDED)))
@@ -179,7 +190,9 @@ class Transaction:
 
     async def _go_back(self) -> End:
         known = {} if self.broken is None else _outcome_of(self.broken)
+        self._returning = True
         if self._back_by is not None:
+            self._hands.decided(self._back_commands)
             self._tell(Kind.RESTORE_TURNED_BACK, self._back_by)
         await self._log.enter(RestoreState.ROLLING_BACK, **known)
         options = self._options(frozenset(self._log.saves_begun))
@@ -258,18 +271,18 @@ class Transaction:
             await self._enter_for(step, direction)
             await self._do(step, direction, confirm_s)
             self.done += 1
-        await self._prove(steps, goals, direction)
-        self._look_for_people(direction)
         saved = {step.device for step in steps if step.kind is StepKind.SAVE}
         restarted = {step.device for step in steps if step.kind is StepKind.RESTART}
-        proven = bool(saved) and saved <= restarted
+        unproven = await self._prove(bool(restarted), goals, direction)
+        self._look_for_people(direction)
+        proven = bool(saved) and saved <= restarted and not unproven
         back = direction is Direction.BACK
         cause = Cause.CANCELLED if self.broken is None else self.broken.cause
         if back:
             self._tell(Kind.RESTORE_ROLLED_BACK, "", cause_key=cause.text_key)
         else:
             self._tell(Kind.RESTORE_DONE)
-        await self._log.enter(RestoreState.ROLLED_BACK if back else RestoreState.DONE, proven=proven)
+        await self._log.enter(RestoreState.ROLLED_BACK if back else RestoreState.DONE, proven=proven, unproven=unproven)
         return End.OLD if back else End.NEW
 
     async def _do(self, step: Step, direction: Direction, confirm_s: float | None) -> None:
@@ -305,21 +318,28 @@ class Transaction:
                 self._hands.look_for_restarts()
                 await asyncio.sleep(LOOK_S)
             self._look_for_people(direction)
-        self._hands.decided()
         self._tell(Kind.RESTORE_CONFIRMED, self._confirmed_by)
         await self._log.enter(
             RestoreState.SAVING, confirmed_by=self._confirmed_by, confirmed_ns=self._hands.connection.stamper()
         )
 
-    async def _prove(self, steps: Sequence[Step], goals: Mapping[Place, Raw], direction: Direction) -> None:
-        """Everything is read again, and every value of the plan must be there."""
+    async def _prove(
+        self, restarted: bool, goals: Mapping[Place, Raw], direction: Direction
+    ) -> list[tuple[str, str]] | None:
+        """Everything is read again, and every value of the plan must be there.
+
+        Gives device and address of what a restart hides (``Hands.prove``).
+        """
         if direction is not Direction.BACK and self._log.state is not RestoreState.PROVING:
             await self._log.enter(RestoreState.PROVING)
         found = await self._read()
         self._hands.look_for_restarts()
+        unproven: list[tuple[str, str]] = []
         for slug in dict.fromkeys(place.slug for place in goals):
-            await self._hands.prove(slug, goals, found, direction)
+            hidden = await self._hands.prove(slug, goals, found, direction, restarted)
+            unproven += [(slug, str(address)) for address in hidden]
         self.found = found
+        return unproven or None
 
     def _tell(self, kind: Kind, person: str | None = None, **details: str) -> None:
         """For the record: what happened to the restore as a whole."""

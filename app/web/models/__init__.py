@@ -190,7 +190,7 @@ class AxisDone(BaseModel):
     device: str
     sent_t_ns: int
     confirmed_t_ns: int | None
-    how: Literal["rpdo", "sdo", "failed"]
+    how: Literal["rpdo", "sdo", "replaced", "failed"]
     error: Failure | None
 
 

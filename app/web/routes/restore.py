@@ -92,7 +92,9 @@ async def roll_back_restore(bench: BenchOf, person: PersonOf, restore_id: str, _
 
 @router.post("/live/restores/{restore_id}/resume", dependencies=[needs(Role.TECHNICIAN)])
 async def resume_restore(bench: BenchOf, person: PersonOf, restore_id: str, _request: Nothing) -> RestoreDoc:
-    """On to the new values, from whatever is there."""
+    """On to the new values, from whatever is there; one that an expert began needs an expert."""
+    if (await bench.restores.get(restore_id)).details["expert"]:
+        require(person, Role.EXPERT)
     await bench.restores.resume(bench.connection, restore_id, person.person)
     return await _doc(bench, restore_id)
 
@@ -151,10 +153,16 @@ async def _order(bench: Bench, connection: Connection, person: SignedIn, request
     )
 
 
+def require(person: SignedIn, role: Role) -> None:
+    """Raises RoleError."""
+    if not person.role.covers(role):
+        raise RoleError(needs=role.value, has=person.role.value)
+
+
 def _check_expert(person: SignedIn, request: RestorePlanRequest) -> None:
     """What only an expert may do he does knowingly. Raises RoleError, UsageError."""
-    if request.expert and not person.role.covers(Role.EXPERT):
-        raise RoleError(needs=Role.EXPERT.value, has=person.role.value)
+    if request.expert:
+        require(person, Role.EXPERT)
     if (request.other_blades_confirmed or request.accepted) and not request.expert:
         raise UsageError(reason="other_blades_confirmed and accepted are for experts: set expert")
 

@@ -847,7 +847,7 @@ export interface paths {
         put?: never;
         /**
          * Resume Restore
-         * @description On to the new values, from whatever is there.
+         * @description On to the new values, from whatever is there; one that an expert began needs an expert.
          */
         post: operations["resume_restore"];
         delete?: never;
@@ -2106,7 +2106,7 @@ export interface components {
              * How
              * @enum {string}
              */
-            how: "rpdo" | "sdo" | "failed";
+            how: "rpdo" | "sdo" | "replaced" | "failed";
             /** Sent T Ns */
             sent_t_ns: number;
         };

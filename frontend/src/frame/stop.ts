@@ -44,6 +44,7 @@ function haltLines(halt: Halt, result: StopResult, t: Translate, nameOf: (slug: 
   return result.axes.map((axis) => {
     const device = nameOf(axis.device);
     if (axis.how === "failed") return t("page.stop.axis_failed", { device });
+    if (axis.how === "replaced") return t("page.stop.axis_replaced", { device });
     if (axis.confirmed_t_ns === null) return t("page.stop.axis_sent", { device });
     const ms = Math.round((axis.confirmed_t_ns - axis.sent_t_ns) / 1e6);
     return t(`page.${halt}.axis_confirmed`, { device, ms });

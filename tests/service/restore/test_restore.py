@@ -11,15 +11,13 @@ import pytest
 
 from app.errors import RestoreChangedError, RestoreOpenError, RestoreStateError, UsageError
 from app.model.address import parse_address
-from app.model.description import Verify
 from app.model.fault import FaultOrder
-from app.service.journal import Entry, Kind
+from app.service.journal import Kind
 from app.service.records.restore_record import Outcome
 from app.service.restore.order import Cause, Objection
-from app.service.restore.survey import boots_of
 from app.service.restore.transaction import End
 from app.service.save import restart, save
-from app.service.stop import CONTROLWORD, Command, command_all
+from app.service.stop import Command, command_all
 from app.service.write import write_raw
 from app.store.restore_rows import Direction, RestoreState, StepState, peek_open
 from app.twins.faults import Instructor
@@ -32,8 +30,6 @@ from tests.service.restore.conftest import CHANGES, PMC, PMM, QUICK, Bench, hold
 from tests.web.rig import wait_until
 
 ACKNOWLEDGE = 0x60
-HOME_OFFSET = {"607C": 1234}
-"""Taken in homing mode only, and the mode changes only while the controlword asks for nothing."""
 
 
 def new_values() -> dict[tuple[str, str], int]:
@@ -294,86 +290,6 @@ async def test_an_axis_that_is_driven_meanwhile_ends_the_writing(bench: Bench) -
     assert await bench.desk.wait(restore_id) is End.NEW
 
 
-async def test_a_feather_is_not_cut_short_by_a_restart(bench: Bench) -> None:
-    """Whoever has sent a FEATHER keeps it: no device of the station is restarted while it stands in the controlword."""
-    connection = bench.connection
-    boots = [boots_of(target) for target in connection.targets]
-    sending: list[asyncio.Future[object]] = []
-
-    def feather_after_the_last_save(entry: Entry) -> None:
-        if entry.kind is Kind.SAVED and entry.device == PMC:
-            command = command_all(connection.axes(), Command.FEATHER, connection.journal, connection.stamper)
-            sending.append(asyncio.ensure_future(command))
-
-    connection.journal.listen(feather_after_the_last_save)
-    restore_id = await bench.begin(restart=True)
-    assert await bench.desk.wait(restore_id) is End.INCOMPLETE
-    assert sending and await sending[0]
-    kept = await bench.desk.get(restore_id)
-    assert kept.outcome["cause"] == Cause.DRIVE_ENABLED.value
-    assert [boots_of(target) for target in connection.targets] == boots
-
-
-async def test_a_stop_halts_the_restore_before_it_restarts_anything(bench: Bench) -> None:
-    """A restart opens the safety chain and drives the other blades: not after a STOP, until a person decides."""
-    connection = bench.connection
-    boots = [boots_of(target) for target in connection.targets]
-    sending: list[asyncio.Future[object]] = []
-
-    def stop_after_the_last_save(entry: Entry) -> None:
-        if entry.kind is Kind.SAVED and entry.device == PMC:
-            command = command_all(connection.axes(), Command.STOP, connection.journal, connection.stamper)
-            sending.append(asyncio.ensure_future(command))
-
-    connection.journal.listen(stop_after_the_last_save)
-    restore_id = await bench.begin(restart=True)
-    assert await bench.desk.wait(restore_id) is End.INCOMPLETE
-    assert sending and await sending[0]
-    kept = await bench.desk.get(restore_id)
-    assert kept.outcome["cause"] == Cause.OVERTAKEN.value
-    assert [boots_of(target) for target in connection.targets] == boots
-    sending.clear()
-    await bench.desk.resume(connection, restore_id, "Anna")
-    assert await bench.desk.wait(restore_id) is (End.INCOMPLETE if sending else End.NEW)
-
-
-async def test_a_stop_is_not_overwritten_to_change_the_mode(bench: Bench) -> None:
-    """To change the mode of operation the controlword is written: not where a person has commanded meanwhile."""
-    connection = bench.connection
-    driver = connection.driver(connection.target(PMC))
-    await command_all(
-        connection.axes(), Command.STOP, connection.journal, connection.stamper
-    )  # its bit 3 must go first
-    order = await bench.order({PMC: HOME_OFFSET})
-    prepared = await bench.desk.prepare(connection, order)
-    before = await bench.ram(PMC, "607C")
-    restore_id = await bench.desk.begin(connection, prepared, prepared.hash)
-    await command_all(connection.axes(), Command.STOP, connection.journal, connection.stamper)
-    assert await bench.desk.wait(restore_id) is End.INCOMPLETE
-    assert (await bench.desk.get(restore_id)).outcome["cause"] == Cause.OVERTAKEN.value
-    assert int.from_bytes(await driver.read(11, CONTROLWORD), "little") == Command.STOP.value
-    assert await bench.ram(PMC, "607C") == before
-    await bench.desk.resume(connection, restore_id, "Anna")
-    assert await bench.desk.wait(restore_id) is End.NEW, "a person has decided, knowing of the STOP"
-
-
-async def test_a_rollback_that_nobody_asked_for_does_not_overwrite_a_stop_either(bench: Bench) -> None:
-    connection = bench.connection
-    driver = connection.driver(connection.target(PMC))
-    await driver.write(
-        11, parse_address("6060"), b"\x03", verify=Verify.ACK
-    )  # it goes back there after the homing mode
-    restore_id = await bench.begin({PMC: HOME_OFFSET}, confirm_s=1.0)
-    await bench.until_state(restore_id, RestoreState.AWAITING_CONFIRMATION)
-    await command_all(connection.axes(), Command.STOP, connection.journal, connection.stamper)
-    assert await bench.desk.wait(restore_id) is End.INCOMPLETE
-    outcome = (await bench.desk.get(restore_id)).outcome
-    assert (outcome["first_cause"], outcome["cause"]) == (Cause.NOT_CONFIRMED.value, Cause.OVERTAKEN.value)
-    assert await bench.ram(PMC, "6040") == Command.STOP.value
-    await bench.desk.roll_back(connection, restore_id, "Anna")
-    assert await bench.desk.wait(restore_id) is End.OLD
-
-
 async def test_who_takes_it_up_again_finds_the_station_fit(bench: Bench, served: Served) -> None:
     """What held when it began must hold again; the way back needs neither battery nor recording."""
     served.spoil(Fault(download_of(11, "6065"), _cut(served)))
@@ -431,6 +347,7 @@ async def test_an_expert_gives_up_what_can_never_be_finished(bench: Bench, serve
     assert (kept.row.state, kept.outcome["given_up_by"]) == (RestoreState.GIVEN_UP, "Berta")
     sealed = await bench.desk.record(restore_id)
     assert sealed is not None and sealed.record.outcome is Outcome.GIVEN_UP
+    assert not any(row.verified or row.saved or row.proven for row in sealed.record.rows), "nothing of it is claimed"
     assert any(one.details.get("reason") == "PMC exchanged" for one in sealed.record.events)
     for again in (bench.desk.resume, bench.desk.roll_back):
         with pytest.raises(RestoreStateError):

@@ -12,7 +12,7 @@ import { usePageSearch } from "../../../frame/search";
 import { type Translate, useTexts } from "../../../texts/texts";
 import { DataTable, type TableColumn } from "../../../ui/DataTable";
 import { GroupMenu } from "./GroupMenu";
-import { inView, isPickable, isPicked, type PlanLine, View, VIEWS } from "./plan";
+import { inView, isLeftOut, isPickable, isPicked, type PlanLine, View, VIEWS } from "./plan";
 import classes from "./Restore.module.css";
 
 interface Props {
@@ -163,7 +163,7 @@ const SIGNS = { write: IconArrowRight, equal: IconEqual, skip: IconBan } as cons
 function Outcome({ line }: { line: PlanLine }) {
   const t = useTexts();
   const { row, rules, unordered, outcome } = line;
-  const Sign = row.why === "not-selected" ? IconSquare : SIGNS[row.treatment];
+  const Sign = isLeftOut(row.why) ? IconSquare : SIGNS[row.treatment];
   const tone = unordered ? "tone-error" : row.treatment === "write" ? "" : "dim";
   const broken = rules.map((rule) => t(`rule.${rule}.title`)).join("\n");
   return (

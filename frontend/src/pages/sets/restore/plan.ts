@@ -96,13 +96,15 @@ function outcomeOf(row: PlanRow, unordered: boolean, t: Translate): string {
   return row.why_key === null ? DASH : t(row.why_key, row.details);
 }
 
-const NOT_SELECTED = "not-selected";
+/** Why an object is left out that a person may choose. */
+const LEFT_OUT: readonly (string | null)[] = ["not-selected", "left-by-feather"];
 /** Said of objects that no restore is about. */
 const NO_MATTER: readonly (string | null)[] = ["read-only", "never", "not-in-set"];
 
 /** True where a person may choose whether it is written. */
-export const isPickable = ({ row }: PlanLine): boolean =>
-  row.treatment === "write" || row.why === NOT_SELECTED;
+export const isPickable = ({ row }: PlanLine): boolean => row.treatment === "write" || isLeftOut(row.why);
+
+export const isLeftOut = (why: string | null): boolean => LEFT_OUT.includes(why);
 
 export const isPicked = ({ row }: PlanLine): boolean => row.treatment === "write";
 

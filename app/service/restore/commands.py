@@ -1,0 +1,16 @@
+"""STOP and FEATHER as a restore sees them: how many there were when a person decided, and how many there are now."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from app.service.connection import Connection
+from app.service.stop import CONTROLWORD
+
+Counts = Mapping[str, int]
+"""How many commands each axis of a connection has got, by slug."""
+
+
+def commands_of(connection: Connection) -> Counts:
+    """Those of now. All axes count, also those that a restore is not about: people stop the machine, not a device."""
+    return {axis.target.slug: axis.driver.commanded(axis.target.node, CONTROLWORD) for axis in connection.axes()}
