@@ -153,6 +153,17 @@ async def as_expert(server: Server) -> None:
     assert (await server.client.post("/api/login", json=anna)).is_success
 
 
+async def test_the_turbine_of_an_open_restore_stays_in_the_site_file(server: Server) -> None:
+    """Taken out, it could never be connected again, and the restore never be finished."""
+    doc = await begun(server)
+    await until(server, doc["id"], "awaiting-confirmation")
+    await server.bench.restores.close()
+    await post(server, "/api/live/disconnect")
+    revision = (await server.client.get("/api/settings/site")).json()["revision"]
+    refused = await server.client.delete(f"/api/settings/site/turbines/wtg-07?revision={revision}")
+    assert (refused.status_code, refused.json()["code"]) == (409, "restore_open")
+
+
 async def test_giving_up_needs_a_reason_and_opens_the_gate(server: Server) -> None:
     doc = await begun(server)
     await until(server, doc["id"], "awaiting-confirmation")

@@ -9,7 +9,7 @@ from fastapi import APIRouter
 
 from app.drivers.adapters import Place
 from app.drivers.can_config import BITRATES_OF
-from app.errors import HubsideError, SiteError
+from app.errors import HubsideError, RestoreOpenError, SiteError
 from app.model.address import Address, parse_address
 from app.model.description import Bus, Description
 from app.model.description_file import BUILTIN, load_builtin
@@ -228,7 +228,10 @@ async def change_turbine(bench: BenchOf, journal: JournalOf, slug: str, request:
 
 @router.delete("/site/turbines/{slug}", dependencies=[needs(Role.TECHNICIAN)])
 async def remove_turbine(bench: BenchOf, journal: JournalOf, slug: str, revision: str) -> SiteDoc:
-    """Take a turbine out of the site file; not the one that is connected."""
+    """Take a turbine out of the site file; not the one that is connected, nor one with a restore to be finished."""
+    for row in bench.restores.open:
+        if row.turbine == slug:
+            raise RestoreOpenError(station=row.station, restore=row.id, device=slug)
     connected = None if bench.connection is None else bench.connection.turbine
     await bench.site_editor.remove(slug, revision, connected, journal)
     return _site_doc(bench)
