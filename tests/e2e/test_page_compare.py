@@ -121,6 +121,7 @@ def test_two_devices_show_what_differs_in_units_and_bit_by_bit(home: Home) -> No
     expect(bits).to_have_count(3)
     expect(bits.last).to_contain_text("X16.1/X16.2")
     expect(bits.last).to_contain_text(re.compile("on.*off"))
+    expect(page).to_have_url(re.compile("find=heater"))  # follows when the typing pauses
     page.reload()
     expect(bits).to_have_count(3)
     page.get_by_test_id("parameter-3201:04").click()
@@ -151,6 +152,7 @@ def test_columns_are_chosen_by_keyboard_and_another_becomes_the_reference(home: 
     expect(head).to_contain_text("Reference")
     expect(cell(page, "3110:01", 2)).to_contain_text("+1.0")
     expect(page.locator("[data-why='no-default']").first).to_have_text("no default given")
+    expect(page.get_by_role("menu")).to_have_count(0)
     page.get_by_test_id(f"menu-live:{THREE}").click()
     page.get_by_test_id("column-remove").click()
     expect(page.get_by_test_id(f"head-live:{THREE}")).to_have_count(0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -131,6 +132,7 @@ def test_the_list_and_the_form_work_by_keyboard_alone(page: Page, demo: str) -> 
     page.get_by_test_id("find").focus()
     page.keyboard.type("servo")
     page.keyboard.press("Enter")
+    expect(page.get_by_role("row", name=re.compile("servo"))).to_be_focused()
     page.keyboard.press("Enter")
     expect(page.get_by_test_id("motor-title")).to_contain_text("SM 4.2-8 servo")
     page.get_by_test_id("motor-edit").focus()

@@ -1,6 +1,6 @@
 import { CloseButton, TextInput } from "@mantine/core";
 import { IconArrowDown, IconArrowUp, IconFilter } from "@tabler/icons-react";
-import { type KeyboardEvent, type ReactNode, useDeferredValue, useRef } from "react";
+import { type KeyboardEvent, type ReactNode, useDeferredValue, useEffect, useRef } from "react";
 import { usePageSearch } from "../frame/search";
 import { useTexts } from "../texts/texts";
 import classes from "./DataTable.module.css";
@@ -64,10 +64,19 @@ export function DataTable<Row>(props: Props<Row>) {
     visible.map((column) => column.title),
     ...shown.map((row) => visible.map((column) => column.text(row))),
   ];
+  const enters = useRef(false);
+  const settled = find === typed;
+  useEffect(() => {
+    if (!settled || !enters.current) return;
+    enters.current = false;
+    focusRow(section.current);
+  }, [settled]);
   const onFilterKey = (event: KeyboardEvent) => {
     if (event.key !== "Enter" && event.key !== "ArrowDown") return;
-    section.current?.querySelector<HTMLElement>('[role="row"][tabindex="0"]')?.focus();
     event.preventDefault();
+    // Not into rows that the last letters are about to take away.
+    if (settled) focusRow(section.current);
+    else enters.current = true;
   };
   return (
     <section
@@ -120,6 +129,9 @@ export function DataTable<Row>(props: Props<Row>) {
     </section>
   );
 }
+
+const focusRow = (table: HTMLElement | null) =>
+  table?.querySelector<HTMLElement>('[role="row"][tabindex="0"]')?.focus();
 
 interface HeadProps<Row> {
   table: ArrangedTable<Row>;
