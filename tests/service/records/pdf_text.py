@@ -7,6 +7,8 @@ import zlib
 
 _OBJECT = re.compile(rb"(?:^|\n)(\d+) 0 obj\n(.*?)(?=\nendobj)", re.S)
 _FONTS = re.compile(rb"/Font<<([^>]*)>>")
+_RESOURCES = re.compile(rb"/Resources (\d+) 0 R")
+_CONTENTS = re.compile(rb"/Contents (\d+) 0 R")
 _NAMED = re.compile(rb"/(f\d+) (\d+) 0 R")
 _GLYPH = re.compile(rb"<([0-9A-F]{4})> <([0-9A-F]+)>")
 _FONT = re.compile(rb"/(f\d+) [\d.]+ Tf")
@@ -15,18 +17,28 @@ _ESCAPED = {b"n": b"\n", b"r": b"\r", b"t": b"\t", b"b": b"\b", b"f": b"\f"}
 
 
 def pdf_text(data: bytes) -> str:
-    """All that is printed, pieces parted by line ends."""
+    """All that is printed, pieces parted by line ends. Each page has its own names of fonts."""
     objects = {int(match[1]): match[2] for match in _OBJECT.finditer(data)}
+    told = []
+    for one in objects.values():
+        resources, contents = _RESOURCES.search(one), _CONTENTS.search(one)
+        if resources and contents:
+            fonts = _fonts(objects, objects[int(resources[1])])
+            if fonts:
+                told.append(_lines(_unpacked(objects[int(contents[1])]), fonts))
+    return "\n".join(told)
+
+
+def _fonts(objects: dict[int, bytes], resources: bytes) -> dict[bytes, dict[int, str]]:
     fonts: dict[bytes, dict[int, str]] = {}
-    for name, number in _NAMED.findall(b" ".join(_FONTS.findall(data))):
+    for name, number in _NAMED.findall(b" ".join(_FONTS.findall(resources))):
         unicode = re.search(rb"/ToUnicode (\d+) 0 R", objects[int(number)])
         assert unicode is not None
         table = _unpacked(objects[int(unicode[1])])
         fonts[name] = {
             int(code, 16): bytes.fromhex(text.decode()).decode("utf-16-be") for code, text in _GLYPH.findall(table)
         }
-    streams = [_unpacked(one) for one in objects.values() if b"stream\n" in one and b"FlateDecode" in one]
-    return "\n".join(_lines(stream, fonts) for stream in streams if b" Tf" in stream)
+    return fonts
 
 
 def _lines(stream: bytes, fonts: dict[bytes, dict[int, str]]) -> str:
