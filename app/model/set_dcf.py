@@ -98,7 +98,7 @@ def _text(entry: Entry, raw: Raw) -> str | None:
     """The value as the file has it, where exactly this value comes back from it."""
     try:
         text = value_text(entry, raw)
-        same = text is not None and parse_value(text, entry.type).raw == raw
+        same = text is not None and repr(parse_value(text, entry.type).raw) == repr(raw)  # 0.0 is not 0
     except (ValueError, OverflowError, TypeError):
         return None
     return text if same and text else None

@@ -90,6 +90,14 @@ def test_any_set_of_the_device_comes_back(parameters: ParameterSet) -> None:
     assert read.hash == parameters.hash
 
 
+def test_a_value_of_another_type_than_its_objects_comes_back_too() -> None:
+    parameters, _ = text_of(DEVICES[0])
+    parameters = replace(parameters, values={**parameters.values, Address(0x1000): 0.0})
+    text = dump_dcf(parameters, DESCRIPTIONS[parameters.description_id])
+    read = load_dcf(text.encode(), "x.dcf", taking(origin=None, descriptions={})).parameters
+    assert (read.hash, repr(read.values[Address(0x1000)])) == (parameters.hash, "0.0")
+
+
 @pytest.mark.parametrize("device", DEVICES)
 def test_canopen_reads_every_value(device: str) -> None:
     parameters, text = text_of(device)
