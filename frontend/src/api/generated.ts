@@ -1774,7 +1774,7 @@ export interface paths {
         post?: never;
         /**
          * Remove Turbine
-         * @description Take a turbine out of the site file; not the one that is connected.
+         * @description Take a turbine out of the site file; not the one that is connected, nor one with a restore to be finished.
          */
         delete: operations["remove_turbine"];
         options?: never;
