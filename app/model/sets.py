@@ -46,6 +46,12 @@ class Identity:
     serial: int | None = None
     nameplate: str | None = None
 
+    def has_serial_of(self, other: Identity) -> bool:
+        """The same serial number, of no other maker and product as far as both are known. 0 is none (CiA 301)."""
+        makers = ((self.vendor_id, other.vendor_id), (self.product_code, other.product_code))
+        known_to_differ = any(None not in pair and pair[0] != pair[1] for pair in makers)
+        return bool(self.serial) and self.serial == other.serial and not known_to_differ
+
     def as_json(self) -> dict[str, Any]:
         """For files and hashes."""
         content = asdict(self)

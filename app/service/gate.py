@@ -57,7 +57,7 @@ class Block:
             return True
         unnamed = self.is_bare or _is_bare(station)
         return any(
-            _is_same(theirs, identity) if theirs.serial and identity.serial else unnamed and where == place
+            theirs.has_serial_of(identity) if theirs.serial and identity.serial else unnamed and where == place
             for where, theirs in self.devices
         )
 
@@ -113,12 +113,6 @@ def adapter_of(connection: str) -> str:
 
 def _is_bare(station: str) -> bool:
     return station.startswith(f"{BARE_TURBINE}/")
-
-
-def _is_same(one: Identity, other: Identity) -> bool:
-    """The same serial number, of no other maker and product as far as both are known."""
-    pairs = ((one.vendor_id, other.vendor_id), (one.product_code, other.product_code))
-    return one.serial == other.serial and all(a is None or b is None or a == b for a, b in pairs)
 
 
 OPEN: Final = Gate({}, Blocks())

@@ -11,6 +11,7 @@ import pytest
 
 from app.errors import BusOpenError, NotConnectedError, UsageError
 from app.model.address import Address
+from app.model.description import Description
 from app.model.description_file import load_builtin
 from app.model.site import Turbine, load_site
 from app.recording.reader import open_recording
@@ -25,7 +26,7 @@ from tests.service.conftest import Served
 POSITION = Address(0x6064)
 
 
-def describe(_turbine: Turbine) -> dict[str, object]:
+def describe(_turbine: Turbine) -> dict[str, Description]:
     return {name: load_builtin(name) for name in ("oat-pmm", "oat-pmc")}
 
 
@@ -39,7 +40,7 @@ async def bench(served: Served, tmp_path: Path) -> AsyncIterator[Bench]:
     other.write_text("schema = 1\n" + text.replace(served.address, "socketcand:127.0.0.1:9"), encoding="utf-8")
     (gone,) = load_site(other)
     (tmp_path / "rec").mkdir()
-    opened = Bench(Sites((here, gone), describe), Options("tester", tmp_path / "rec", listen_s=0.2))  # type: ignore[arg-type]
+    opened = Bench(Sites((here, gone), describe), Options("tester", tmp_path / "rec", listen_s=0.2))
     yield opened
     await opened.close()
 

@@ -261,8 +261,8 @@ async def test_only_our_own_twins_have_an_instructor_and_they_are_twins_from_the
 ) -> None:
     other = make_connection()  # its bus is at the usual address
     (turbine,) = load_site(site_for(f"{served.address}@500000", tmp_path))
-    ours = Connection(turbine, describe(turbine), options())  # type: ignore[arg-type]
-    bench = Bench(Sites((turbine,), describe), options(), instructor=control.client)  # type: ignore[arg-type]
+    ours = Connection(turbine, describe(turbine), options())
+    bench = Bench(Sites((turbine,), describe), options(), instructor=control.client)
     try:
         assert desk_of(bench) is bench.desk is not None, "nothing real is connected"
         bench.show(other)

@@ -35,7 +35,7 @@ PMC = "wtg-07/blade-1/pmc"
 async def bench(served: Served, tmp_path: Path) -> AsyncIterator[Bench]:
     """Not connected."""
     site = load_site(site_for(served.address, tmp_path))
-    made = Bench(Sites(site, describe), options(), store=Store.open(tmp_path))  # type: ignore[arg-type]
+    made = Bench(Sites(site, describe), options(), store=Store.open(tmp_path))
     yield made
     await made.close()
 
@@ -89,7 +89,7 @@ async def test_a_look_that_lost_the_bus_is_repeated_and_its_fragment_is_kept_now
 ) -> None:
     site = load_site(site_for(served.address, tmp_path))
     recorded = replace(options(), recordings=tmp_path / "rec")
-    bench = Bench(Sites(site, describe), recorded, store=Store.open(tmp_path))  # type: ignore[arg-type]
+    bench = Bench(Sites(site, describe), recorded, store=Store.open(tmp_path))
     try:
         connection = await bench.connect("wtg-07", "anna")
         await until(lambda: connection.target(PMM).lookup(DEVICE_NAME) is not None)

@@ -11,6 +11,7 @@ import pytest
 
 from app.errors import NoVisitError
 from app.model.address import Address
+from app.model.description import Description
 from app.model.description_file import load_builtin
 from app.model.site import Turbine, load_site
 from app.service.bench import Bench
@@ -36,7 +37,7 @@ OTHER = Address(0x3110, 2)
 DEADLINE_S = 20.0
 
 
-def describe(_turbine: Turbine) -> dict[str, object]:
+def describe(_turbine: Turbine) -> dict[str, Description]:
     return {name: load_builtin(name) for name in ("oat-pmm", "oat-pmc")}
 
 
@@ -47,7 +48,7 @@ def options(person: str = "anna") -> Options:
 @asynccontextmanager
 async def at_work(served: Served, folder: Path) -> AsyncIterator[Bench]:
     """A bench with its store in ``folder``, connected, everything read."""
-    bench = Bench(Sites(load_site(site_for(served.address, folder)), describe), options(), store=Store.open(folder))  # type: ignore[arg-type]
+    bench = Bench(Sites(load_site(site_for(served.address, folder)), describe), options(), store=Store.open(folder))
     try:
         await bench.connect("wtg-07", "anna")
         await until(lambda: bench.office.visits.looked)
@@ -59,7 +60,7 @@ async def at_work(served: Served, folder: Path) -> AsyncIterator[Bench]:
 @asynccontextmanager
 async def other_master(served: Served, folder: Path) -> AsyncIterator[Connection]:
     (turbine,) = load_site(site_for(served.address, folder))
-    async with Connection(turbine, describe(turbine), options("nobody")) as opened:  # type: ignore[arg-type]
+    async with Connection(turbine, describe(turbine), options("nobody")) as opened:
         yield opened
 
 
@@ -143,7 +144,7 @@ async def test_a_visit_that_nobody_ended_counts_with_its_writes(served: Served, 
     store = Store.open(tmp_path)
     later_ns = visit.started_ns + GOES_ON_NS + 1
     async with other_master(served, tmp_path) as connection:
-        office = Bench(Sites((), describe), options(), store=store, wall_ns=lambda: later_ns).office  # type: ignore[arg-type]
+        office = Bench(Sites((), describe), options(), store=store, wall_ns=lambda: later_ns).office
         await office.visits.begin("wtg-07", "carl")
         closed = next(one for one in await office.visits.latest("wtg-07", 10) if one.id == visit.id)
         assert closed.left_open
@@ -170,7 +171,7 @@ async def test_a_visit_goes_on_after_a_restart_within_a_shift(tmp_path: Path) ->
         return clock[0]
 
     store = Store.in_memory()
-    audit = Bench(Sites((), describe), options(), store=store).office.audit  # type: ignore[arg-type]
+    audit = Bench(Sites((), describe), options(), store=store).office.audit
     visits = Visits(store, audit, stamp)
     first = await visits.begin("wtg-07", "anna")
     assert (await Visits(store, audit, stamp).begin("wtg-07", "bert")) == first

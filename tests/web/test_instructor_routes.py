@@ -46,7 +46,7 @@ async def control(served: Served, tmp_path: Path) -> AsyncIterator[Control]:
 @pytest.fixture
 async def server(control: Control, tmp_path: Path) -> AsyncIterator[Server]:
     """A server that has started the twins; nothing is connected yet."""
-    sites = Sites(load_site(site_for(control.served.address, tmp_path)), describe)  # type: ignore[arg-type]
+    sites = Sites(load_site(site_for(control.served.address, tmp_path)), describe)
     bench = Bench(sites, options(), store=Store.in_memory(), instructor=control.client)
     listener = open_port(0)
     port = port_of(listener)

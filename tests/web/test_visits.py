@@ -29,7 +29,7 @@ SINCE = "/api/live/changes-since-last-visit"
 @pytest.fixture
 async def page(served: Served, tmp_path: Path) -> AsyncIterator[httpx.AsyncClient]:
     """A client of a server whose bench connects by itself."""
-    sites = Sites(load_site(site_for(served.address, tmp_path)), describe)  # type: ignore[arg-type]
+    sites = Sites(load_site(site_for(served.address, tmp_path)), describe)
     bench = Bench(sites, options(), store=Store.open(tmp_path))
     listener = open_port(0)
     port = port_of(listener)

@@ -122,8 +122,7 @@ def is_same_unit(of_set: Identity, device: Identity, nameplate: str | None) -> b
     if is_contradictory(of_set, device, nameplate):
         return False
     if of_set.serial and device.serial:
-        makers = _differ(of_set.vendor_id, device.vendor_id) or _differ(of_set.product_code, device.product_code)
-        return of_set.serial == device.serial and not makers
+        return of_set.has_serial_of(device)
     return nameplate is not None and of_set.nameplate == nameplate
 
 
