@@ -15,7 +15,8 @@ run: $(VENV)/.ready frontend/dist/index.html
 	$(BIN)/hubside demo
 
 test: setup check
-	$(PY) -m pytest -m "not soak"
+	$(PY) -m pytest -m "not (soak or browser or alone)" -n 2 --dist loadfile
+	$(PY) -m pytest -m "(browser or alone) and not soak"  # a browser wants the machine for itself
 	cd frontend && npm test
 
 check: $(VENV)/.ready frontend/node_modules/.ready
@@ -33,11 +34,12 @@ soak: setup
 
 setup: system $(VENV)/.ready frontend/dist/index.html
 
-# The browser of the end-to-end tests and the tracer of the recorder's test come from the system.
+# The browser of the end-to-end tests, the tracer of the recorder's test and tshark come from the system.
 system:
 	@missing=""; \
 	command -v chromium >/dev/null || missing="$$missing chromium fonts-dejavu-core"; \
 	command -v strace >/dev/null || missing="$$missing strace"; \
+	command -v tshark >/dev/null || missing="$$missing tshark"; \
 	if [ -n "$$missing" ]; then \
 	  $(ROOT) apt-get update -qq && DEBIAN_FRONTEND=noninteractive $(ROOT) apt-get install -y -qq $$missing >/dev/null; \
 	fi

@@ -8,7 +8,10 @@
     │   ├── SiteError                       a site file: file, key, reason
     │   ├── SetFileError                    a parameter-set file: file, line, reason
     │   ├── ColumnError                     a column of a comparison that cannot be shown; names it
+    │   ├── ForeignFileError                a recording of others cannot be read: file, line, what was expected
+    │   ├── SignatureError                  the text of a search is not understood; names the position
     │   ├── MotorFileError                  a file of motors: file, line, column, reason
+    │   ├── BundleError                     a bundle of an incident cannot be opened: file, reason
     │   ├── SigningKeyError                 the key that seals records cannot be made or read
     │   └── StoreError                      the store cannot be opened, read or written
     │       ├── StoreDamagedError           its file is damaged
@@ -40,6 +43,11 @@
     │   ├── MotorUnknownError               no such motor, or no such version of it
     │   ├── MotorChangedError               somebody else has changed the motor meanwhile
     │   ├── MotorInventedError              the motor is an invented example
+    │   ├── IncidentFieldError              a field of an incident or annotation does not fit
+    │   ├── IncidentUnknownError            no such incident, or no such version of it
+    │   ├── IncidentChangedError            somebody else has changed the incident meanwhile
+    │   ├── IncidentRecordingError          the recording of an incident is not there, or is another file
+    │   ├── AnnotationUnknownError          no such annotation
     │   ├── RestoreOpenError                a restore of the station is not finished
     │   ├── RestoreRefusedError             the pre-check of a restore found reasons against it
     │   ├── RestoreChangedError             the plan of a restore is no longer the one that was looked at
@@ -50,6 +58,19 @@
     │   ├── SetTagError                     a tag that visits give, not people
     │   ├── SetIncompleteError              a set with unread objects cannot be golden
     │   ├── NameplateError                  a serial number that is none, or typed differently twice
+    │   ├── ReplayOnlyError                 a replay can never write to a device
+    │   ├── RecordingLiveError              a recording that is being written cannot be replayed
+    │   ├── ReplayEndedError                the replay was closed
+    │   ├── MomentError                     a moment of a recording that cannot be had
+    │   ├── IndexMissingError               the index of a recording is not made yet
+    │   ├── LeaseNeededError                nobody has the lease of the axes
+    │   ├── LeaseHeldError                  another page has the lease, or asks for it already
+    │   ├── LeaseError                      an old lease: another one was given since
+    │   ├── OldOrderError                   an order to an axis that came before, or late
+    │   ├── NotHeldError                    nobody holds what moves the axis
+    │   ├── InterlockError                  an interlock keeps the axis from moving; names it
+    │   ├── AxisStateError                  the axis is in another state than the command wants
+    │   ├── NotPreparedError                motion of the axis is not prepared
     │   ├── NoInstructorError               the connected turbine is none of the twins that we started
     │   └── FaultOrderError                 a fault that cannot be put into a twin so; names the field
     │       └── FaultValueError             one of its values is out of range; names the limits
@@ -106,6 +127,12 @@ class DescriptionError(UsageError):
     code = "description"
 
 
+class SignatureError(UsageError):
+    """The text of a search is not understood. Details: position (of a character, from 1), found, reason_key."""
+
+    code = "signature"
+
+
 class SiteError(UsageError):
     """A site file is wrong. Details: file, key, reason."""
 
@@ -124,10 +151,22 @@ class SigningKeyError(UsageError):
     code = "signing_key"
 
 
+class ForeignFileError(UsageError):
+    """A recording of others cannot be read. Details: file, line, found, why, expected_key (a text key)."""
+
+    code = "foreign_file"
+
+
 class MotorFileError(UsageError):
     """A file of motors is wrong; none was taken. Details: file, line, column, reason_key and what it is about."""
 
     code = "motor_file"
+
+
+class BundleError(UsageError):
+    """A bundle of an incident cannot be opened. Details: file, reason_key and what it is about."""
+
+    code = "bundle"
 
 
 class ColumnError(UsageError):
@@ -239,6 +278,36 @@ class NotConnectedError(RefusedError):
     code = "not_connected"
 
 
+class ReplayOnlyError(RefusedError):
+    """What is shown is a recording: nothing in it can be written, saved, moved or restarted."""
+
+    code = "replay_only"
+
+
+class RecordingLiveError(RefusedError):
+    """The recording is being written; what it holds so far can be looked at in the rooms. Details: recording."""
+
+    code = "recording_live"
+
+
+class ReplayEndedError(RefusedError):
+    """The replay was closed; it can be opened again. Details: recording (its name)."""
+
+    code = "replay_ended"
+
+
+class MomentError(RefusedError):
+    """A moment of a recording that cannot be had. Details: recording, reason."""
+
+    code = "moment"
+
+
+class IndexMissingError(RefusedError):
+    """The index of the recording is not made yet. Details: recording (its file)."""
+
+    code = "index_missing"
+
+
 class RoleError(RefusedError):
     """The person's role does not cover it. Details: needs, has (names of roles)."""
 
@@ -317,6 +386,36 @@ class MotorInventedError(RefusedError):
     code = "motor_invented"
 
 
+class IncidentFieldError(RefusedError):
+    """A field of an incident or annotation does not fit. Details: field, reason_key and what it is about."""
+
+    code = "incident_field"
+
+
+class IncidentUnknownError(RefusedError):
+    """No such incident, or no such version of it. Details: incident."""
+
+    code = "incident_unknown"
+
+
+class IncidentChangedError(RefusedError):
+    """The incident has another version than the one that was changed. Details: incident, version, newest."""
+
+    code = "incident_changed"
+
+
+class IncidentRecordingError(RefusedError):
+    """The recording of an incident is not there, or another file has its name. Details: recording, reason_key."""
+
+    code = "incident_recording"
+
+
+class AnnotationUnknownError(RefusedError):
+    """No such annotation. Details: annotation."""
+
+    code = "annotation_unknown"
+
+
 class RestoreOpenError(RefusedError):
     """A restore of the station is not finished: its values may be half old, half new. Details: station, restore."""
 
@@ -375,6 +474,54 @@ class NameplateError(RefusedError):
     """The serial number of a nameplate is none, or the second entry differs. Details: device, reason_key."""
 
     code = "nameplate"
+
+
+class LeaseNeededError(RefusedError):
+    """Nobody has the lease of the axes."""
+
+    code = "lease_needed"
+
+
+class LeaseHeldError(RefusedError):
+    """Another page has the lease, or asks for it already. Details: holder."""
+
+    code = "lease_held"
+
+
+class LeaseError(RefusedError):
+    """The command bears the number of an old lease. Details: holder."""
+
+    code = "lease"
+
+
+class OldOrderError(RefusedError):
+    """An order to an axis that came before, or later than one that was given after it. Details: order, latest."""
+
+    code = "old_order"
+
+
+class NotHeldError(RefusedError):
+    """Nobody holds what moves the axis, or it was let go. Details: device."""
+
+    code = "not_held"
+
+
+class InterlockError(RefusedError):
+    """An interlock keeps the axis from moving. Details: device, interlock, reason."""
+
+    code = "interlock"
+
+
+class AxisStateError(RefusedError):
+    """The axis is in another state than the command wants. Details: device, state, wanted."""
+
+    code = "axis_state"
+
+
+class NotPreparedError(RefusedError):
+    """Motion of the axis is not prepared. Details: device."""
+
+    code = "not_prepared"
 
 
 class NoInstructorError(RefusedError):

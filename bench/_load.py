@@ -29,6 +29,11 @@ def frames(count: int, first_cycle: int = 1) -> list[Can]:
     return list(itertools.islice(_sequence(random.Random(1), first_cycle), count))
 
 
+def endless() -> Iterator[Can]:
+    """The same frames without an end."""
+    return _sequence(random.Random(1), 1)
+
+
 def position_of(can: Can) -> tuple[int, int] | None:
     """Node and position (6064h) where the frame carries one."""
     node = can.can_id - POSITION_TPDO

@@ -20,14 +20,20 @@ class Child:
     """``python -m MODULE ARGUMENTS``. Its end: standard input is closed; what does not end by that is killed.
 
     ``quiet``: what it says on standard error is thrown away. ``environment`` stands in for ours where given.
+    ``before``: a program, with its arguments, that runs this one.
     """
 
     def __init__(
-        self, module: str, *arguments: str, quiet: bool = False, environment: Mapping[str, str] | None = None
+        self,
+        module: str,
+        *arguments: str,
+        quiet: bool = False,
+        environment: Mapping[str, str] | None = None,
+        before: Sequence[str] = (),
     ) -> None:
         self.module = module
         self._lines: Queue[str] = Queue()
-        command: Sequence[str] = (sys.executable, "-u", "-m", module, *arguments)
+        command: Sequence[str] = (*before, sys.executable, "-u", "-m", module, *arguments)
         stderr = subprocess.DEVNULL if quiet else None
         self._process = subprocess.Popen(
             command,

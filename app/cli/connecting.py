@@ -162,6 +162,7 @@ def options_of(arguments: argparse.Namespace, record: bool) -> Options:
         consent=arguments.consent,
         listen_s=arguments.listen_s,
         data=settings.data,
+        more_recordings=getattr(arguments, "recordings", ()),
     )
 
 

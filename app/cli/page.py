@@ -7,6 +7,7 @@ import asyncio
 import secrets
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from urllib.parse import urlencode
 
 from app.errors import UsageError
 from app.scene.hub import HubScene
@@ -34,7 +35,11 @@ async def serve_page(arguments: argparse.Namespace, bench: Bench) -> AsyncIterat
     try:
         application = create_app(bench, access, at, scene, arguments.settings.language, reach=reach)
         async with serve(application, listener, listen.tls):
-            yield listen.url(at) if sessions.login_needed else f"{listen.url(at)}?token={access.issue_token()}"
+            query = {} if sessions.login_needed else {"token": access.issue_token()}
+            first = next(iter(bench.options.more_recordings), None)
+            if first is not None:
+                query["replay"] = first.stem
+            yield f"{listen.url(at)}?{urlencode(query)}" if query else listen.url(at)
     finally:
         await asyncio.to_thread(scene.close)
 

@@ -18,7 +18,7 @@ from app.cli.output import Output
 from app.cli.runtime import spare_collector
 from app.cli.targets import add_connection
 from app.errors import NoAnswerError
-from app.recording.recover import recover_all
+from app.recording.recover import RecoveryKind, recover_all
 from app.service.bench import Bench
 
 
@@ -45,7 +45,8 @@ def serve_turbine(arguments: argparse.Namespace, output: Output) -> int:
 
 async def _serve(arguments: argparse.Namespace, output: Output) -> int:
     settings = arguments.settings
-    for recovery in recover_all(settings.recordings, time.time_ns()):
+    recoveries = recover_all(settings.recordings, time.time_ns())
+    for recovery in recoveries:
         output.say("cli.recovered", file=recovery.file, frames=recovery.frames, dropped=recovery.lost_bytes)
     stop = asyncio.Event()
     loop = asyncio.get_running_loop()
@@ -53,6 +54,9 @@ async def _serve(arguments: argparse.Namespace, output: Output) -> int:
         with contextlib.suppress(NotImplementedError):  # Windows: Ctrl-C comes as KeyboardInterrupt
             loop.add_signal_handler(number, stop.set)
     turbine, bench = await make_bench(arguments, output, not arguments.no_record)
+    for recovery in recoveries:
+        if recovery.kind is not RecoveryKind.SET_ASIDE:
+            bench.indexing.later(settings.recordings / recovery.file)
     connecting = asyncio.create_task(_connect(bench, turbine, settings.person, output))
     try:
         # In a thread, and while the bus is opened and listened to: that takes about as long as loading the libraries.

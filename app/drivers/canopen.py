@@ -287,6 +287,11 @@ class CanOpenDriver:
         self._require_active(None)
         self._port.send(Can(0x000, nmt.nmt_message(command, node)))
 
+    def beat(self, node: int) -> None:
+        """Send one heartbeat as ``node``, operational (CiA 301, 7.2.8.3.2.2). Raises ConsentError, BusLostError."""
+        self._require_active(node)
+        self._port.send(Can(_HEARTBEAT_BASE + node, nmt.heartbeat(nmt.NmtState.OPERATIONAL)))
+
     async def restart(self, node: int, timeout_s: float = 10.0) -> None:
         """NMT reset node, then wait for its boot-up message. Raises NoAnswerError, ConsentError, BusLostError."""
         self._require_active(node)

@@ -12,16 +12,22 @@ from typing import Any, Final
 from app.errors import SiteError
 
 SCHEMA: Final = 1
+HEARTBEAT_NODE: Final = 126
+"""Seldom given to a device, and not the last one, which some tools take for themselves."""
 _SLUG: Final = re.compile(r"^[a-z0-9]+(-[a-z0-9]+)*$")
 
 
 @dataclass(frozen=True, slots=True)
 class BusConfig:
-    """One bus of a turbine: its name in recordings, the adapter (``socketcand:127.0.0.1:29536``) and the bit rate."""
+    """One bus of a turbine: its name in recordings, the adapter (``socketcand:127.0.0.1:29536``) and the bit rate.
+
+    ``heartbeat_node`` is the number under which this tool beats while axes are moved; no device may have it.
+    """
 
     name: str
     connection: str
     bitrate: int
+    heartbeat_node: int = HEARTBEAT_NODE
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,12 +127,13 @@ class _Reader:
         where = f"turbine.{slug}."
         self._known(table, "name bus station", where)
         for name, bus in self._tables(table, "bus", where):
-            self._known(bus, "connection bitrate", f"{where}bus.{name}.")
+            self._known(bus, "connection bitrate heartbeat_node", f"{where}bus.{name}.")
         buses = tuple(
             BusConfig(
                 name,
                 self._text(bus, "connection", f"{where}bus.{name}."),
                 self._int(bus, "bitrate", f"{where}bus.{name}.", 500_000),
+                self._node(bus, "heartbeat_node", f"{where}bus.{name}.", HEARTBEAT_NODE),
             )
             for name, bus in self._tables(table, "bus", where)
         )
@@ -134,7 +141,8 @@ class _Reader:
             self._station(slug, name, station, buses) for name, station in self._tables(table, "station", where)
         )
         turbine = Turbine(slug, str(table.get("name", slug.upper())), buses, stations)
-        seen: dict[tuple[str, int], str] = {}
+        named = {name for name, bus in self._tables(table, "bus", where) if "heartbeat_node" in bus}
+        seen = {(bus.name, bus.heartbeat_node): f"{where}bus.{bus.name}" for bus in buses if bus.name in named}
         for device in turbine.devices:
             other = seen.setdefault((device.bus, device.node), device.slug)
             if other != device.slug:
@@ -155,9 +163,7 @@ class _Reader:
 
     def _device(self, slug: str, table: Mapping[str, Any], where: str, buses: tuple[BusConfig, ...]) -> Device:
         self._known(table, "name description bus node", where)
-        node = self._int(table, "node", where, None)
-        if not 1 <= node <= 127:
-            raise self._wrong(f"{where}node", f"is {node}, not 1 to 127")
+        node = self._node(table, "node", where, None)
         bus = str(table.get("bus", buses[0].name if buses else ""))
         if bus not in {one.name for one in buses}:
             raise self._wrong(f"{where}bus", f"bus '{bus}' is not named in this turbine")
@@ -169,6 +175,12 @@ class _Reader:
         if not isinstance(value, str) or not value:
             raise self._wrong(f"{where}{key}", "is missing or no text")
         return value
+
+    def _node(self, table: Mapping[str, Any], key: str, where: str, default: int | None) -> int:
+        node = self._int(table, key, where, default)
+        if not 1 <= node <= 127:
+            raise self._wrong(f"{where}{key}", f"is {node}, not 1 to 127")
+        return node
 
     def _int(self, table: Mapping[str, Any], key: str, where: str, default: int | None) -> int:
         value = table.get(key, default)

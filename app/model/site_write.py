@@ -18,7 +18,7 @@ from tomlkit.exceptions import TOMLKitError
 from tomlkit.items import InlineTable
 
 from app.errors import SiteError
-from app.model.site import SCHEMA, BusConfig, Device, Station, Turbine, read_site
+from app.model.site import HEARTBEAT_NODE, SCHEMA, BusConfig, Device, Station, Turbine, read_site
 
 _HEAD: Final = "Turbines, their stations and devices, and where each is found on a bus."
 _KEPT: Final = ".previous"
@@ -113,6 +113,7 @@ def _turbine(table: MutableMapping[str, Any], turbine: Turbine) -> None:
 def _bus(table: MutableMapping[str, Any], bus: BusConfig) -> None:
     _put(table, "connection", bus.connection, None)
     _put(table, "bitrate", bus.bitrate, None)
+    _put(table, "heartbeat_node", bus.heartbeat_node, HEARTBEAT_NODE)
 
 
 def _station(table: MutableMapping[str, Any], station: Station, first_bus: str) -> None:

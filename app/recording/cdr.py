@@ -29,6 +29,21 @@ MAX_DATA: Final = 8
 MAX_DLC: Final = 15
 MAX_T_NS: Final = NS << 31  # where the seconds of builtin_interfaces/Time end, in 2038
 
+
+class Representation(Enum):
+    """The forms of CDR whose layout of a CAN frame is the same but for the byte order: the first two bytes."""
+
+    BIG_ENDIAN = 0x0000
+    LITTLE_ENDIAN = 0x0001
+    BIG_ENDIAN_2 = 0x0006
+    LITTLE_ENDIAN_2 = 0x0007
+
+    @property
+    def order(self) -> str:
+        """The byte order as ``struct`` and NumPy write it."""
+        return "<" if self.value & 1 else ">"
+
+
 Times = npt.NDArray[np.uint64]
 CanArray = npt.NDArray[np.void]
 

@@ -3,21 +3,29 @@
 from __future__ import annotations
 
 import struct
-import zlib
-from collections.abc import Sequence
+import threading
+from collections.abc import Collection, Sequence
 from enum import Enum
+from io import BytesIO
 from typing import Final, NamedTuple
 
+import lz4.frame
 import numpy as np
 import zstandard
+from isal import isal_zlib
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
 from mcap.records import Chunk
 
 from app.recording.cdr import MESSAGE_FIXED, OP_MESSAGE, RECORD_PREFIX, CanArray, Times, message_record
 
 COMPRESSION: Final = "zstd"
+LZ4: Final = "lz4"
+"""How others compress."""
 OP_CHUNK: Final = 6
 OP_MESSAGE_INDEX: Final = 7
-MAX_CHUNK_BYTES: Final = 1 << 28  # a chunk that claims more is taken as damaged, not as a reason to allocate it
+MAX_CHUNK_BYTES: Final = 1 << 27  # a chunk that claims more is taken as damaged, not as a reason to allocate it
+_PIECE: Final = 1 << 9  # a few bytes may stand for 128 KiB
 _CHUNK_HEAD: Final = struct.Struct("<BQQQQII4sQ")
 _INDEX_HEAD: Final = struct.Struct("<BQHI")
 _INDEX_ENTRY: Final = np.dtype([("log_time", "<u8"), ("offset", "<u8")])
@@ -57,6 +65,23 @@ class Body(NamedTuple):
     data: bytes
     times: Times
     offsets: Times
+
+
+class ChunkPlace(NamedTuple):
+    """A chunk in the file: times of its first and last message, its record's ``length`` bytes at ``offset``, its topic.
+
+    ``length`` 0: the messages that could be read of a last chunk without its end. In files of others the topic is
+    ``ANY_CHANNEL``, and the record may be a run of messages outside chunks.
+    """
+
+    start_ns: int
+    end_ns: int
+    offset: int
+    length: int
+    channel_id: int
+
+
+ANY_CHANNEL: Final = -1
 
 
 class EncodedChunk(NamedTuple):
@@ -116,7 +141,7 @@ def encode_chunk(body: Body, packer: zstandard.ZstdCompressor, with_index: bool)
         start_ns,
         end_ns,
         len(body.data),
-        zlib.crc32(body.data),
+        isal_zlib.crc32(body.data),
         len(COMPRESSION),
         COMPRESSION.encode(),
         len(packed),
@@ -136,51 +161,139 @@ def message_index(body: Body) -> bytes:
     return _INDEX_HEAD.pack(OP_MESSAGE_INDEX, 2 + 4 + size, body.channel_id, size) + entries.tobytes()
 
 
+def read_chunk(record: bytes) -> Chunk:
+    """The chunk of a whole chunk record. Raises ``ValueError`` where it is none."""
+    if len(record) >= _CHUNK_HEAD.size:
+        opcode, length, start_ns, end_ns, size, crc, word, compression, packed = _CHUNK_HEAD.unpack_from(record)
+        whole = opcode == OP_CHUNK and length == len(record) - RECORD_PREFIX.size
+        if whole and word == len(COMPRESSION) and packed == len(record) - _CHUNK_HEAD.size:
+            name = compression.decode("ascii", "replace")
+            return Chunk(name, record[_CHUNK_HEAD.size :], end_ns, start_ns, crc, size)
+    return _read_any_chunk(record)
+
+
+def _read_any_chunk(record: bytes) -> Chunk:
+    """The same for a compression whose name has another length."""
+    try:
+        chunk: Chunk = Chunk.read(ReadDataStream(BytesIO(record[RECORD_PREFIX.size :])))
+    except (McapError, struct.error, ValueError, OverflowError) as error:
+        raise ValueError(f"Chunk: {error}") from error
+    return chunk
+
+
 def chunk_data(chunk: Chunk) -> bytes:
     """The uncompressed records of a chunk. Raises ``ValueError`` where they cannot be had or the CRC differs."""
     if not 0 < chunk.uncompressed_size <= MAX_CHUNK_BYTES:
         raise ValueError("chunk size out of range")
     if chunk.compression == COMPRESSION:
-        data = _decompress(chunk.data)
+        data = _decompress(chunk.data, chunk.uncompressed_size)
+    elif chunk.compression == LZ4:
+        data = _decompress_lz4(chunk.data, chunk.uncompressed_size)
     elif chunk.compression == "":
         data = chunk.data
     else:
         raise ValueError(f"compression {chunk.compression!r} is not known")
     if len(data) != chunk.uncompressed_size:
         raise ValueError("chunk has another size than it states")
-    if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
+    if chunk.uncompressed_crc and isal_zlib.crc32(data) != chunk.uncompressed_crc:
         raise ValueError("CRC of the chunk differs")
     return data
 
 
-def _decompress(packed: bytes) -> bytes:
+_OF_THREAD: Final = threading.local()
+
+
+def _unpacker() -> zstandard.ZstdDecompressor:
+    """One for each thread: it must not be shared, and making one takes as long as a tenth of a chunk."""
+    found: zstandard.ZstdDecompressor | None = getattr(_OF_THREAD, "unpacker", None)
+    if found is None:
+        found = _OF_THREAD.unpacker = zstandard.ZstdDecompressor()
+    return found
+
+
+def unpack_into(chunk: Chunk, target: memoryview) -> None:
+    """``chunk_data`` into a place of ``uncompressed_size`` bytes: with no memory of its own it takes half the time.
+
+    Raises ``ValueError`` as ``chunk_data`` does.
+    """
+    if chunk.compression != COMPRESSION:
+        target[:] = chunk_data(chunk)
+        return
     try:
-        if not 0 < zstandard.frame_content_size(packed) <= MAX_CHUNK_BYTES:
+        reader = _unpacker().stream_reader(chunk.data)
+        at = 0
+        while at < len(target) and (count := reader.readinto(target[at:])):
+            at += count
+        more = reader.read(1)
+    except zstandard.ZstdError as error:
+        raise ValueError(f"zstd: {error}") from error
+    if at != len(target) or more:
+        raise ValueError("chunk has another size than it states")
+    if chunk.uncompressed_crc and isal_zlib.crc32(target) != chunk.uncompressed_crc:
+        raise ValueError("CRC of the chunk differs")
+
+
+def _decompress(packed: bytes, size: int) -> bytes:
+    """``size`` serves where the frame does not state its own, as that of other writers."""
+    try:
+        stated = zstandard.frame_content_size(packed)
+        if not (stated == -1 or 0 < stated <= MAX_CHUNK_BYTES):
             raise ValueError("chunk size out of range")
-        return zstandard.ZstdDecompressor().decompress(packed)
+        return zstandard.ZstdDecompressor().decompress(packed, max_output_size=size)
     except zstandard.ZstdError as error:
         raise ValueError(f"zstd: {error}") from error
 
 
+def _decompress_lz4(packed: bytes, size: int) -> bytes:
+    try:
+        data: bytes = lz4.frame.LZ4FrameDecompressor().decompress(packed, max_length=size + 1)
+    except (RuntimeError, EOFError, ValueError) as error:
+        raise ValueError(f"lz4: {error}") from error
+    return data
+
+
 def partial_body(packed: bytes) -> Body | None:
     """The whole messages of a chunk whose end is missing, as far as zstd gives them back. No CRC covers them."""
-    try:
-        data = zstandard.ZstdDecompressor().decompressobj().decompress(packed)
-    except zstandard.ZstdError:
-        return None
-    end = _whole_messages(data)
+    data = partial_data(packed, COMPRESSION)
+    end = whole_records(data, {OP_MESSAGE})
     try:
         return split_body(data[:end])
     except ValueError:
         return None
 
 
-def _whole_messages(data: bytes) -> int:
-    """Where the last whole message record in ``data`` ends."""
+def partial_data(packed: bytes, compression: str) -> bytes:
+    """What can be had of a compressed chunk whose end is missing; nothing where it makes no sense, or too much."""
+    try:
+        if compression == COMPRESSION:
+            return _beginning(packed)
+        if compression == LZ4:
+            data: bytes = lz4.frame.LZ4FrameDecompressor().decompress(packed, max_length=MAX_CHUNK_BYTES)
+            return data
+    except (zstandard.ZstdError, RuntimeError, EOFError, ValueError):
+        return b""
+    return packed if compression == "" else b""
+
+
+def _beginning(packed: bytes) -> bytes:
+    """What zstd gives back before its data end, piece by piece: damaged data may swell to any size."""
+    unpacker = zstandard.ZstdDecompressor().decompressobj()
+    found = bytearray()
+    for at in range(0, len(packed), _PIECE):
+        found += unpacker.decompress(packed[at : at + _PIECE])
+        if len(found) > MAX_CHUNK_BYTES:
+            return b""
+        if unpacker.eof:
+            break
+    return bytes(found)
+
+
+def whole_records(data: bytes, opcodes: Collection[int]) -> int:
+    """Where the last whole record in ``data`` ends, up to the first one of another kind than ``opcodes``."""
     at = 0
     while at + RECORD_PREFIX.size <= len(data):
         opcode, length = RECORD_PREFIX.unpack_from(data, at)
-        if opcode != OP_MESSAGE or at + RECORD_PREFIX.size + length > len(data):
+        if opcode not in opcodes or at + RECORD_PREFIX.size + length > len(data):
             break
         at += RECORD_PREFIX.size + length
     return at

@@ -18,6 +18,7 @@ METADATA_NODES: Final = "nodes"
 METADATA_VERSIONS: Final = "versions"
 METADATA_TOTALS: Final = "totals"
 METADATA_RECOVERY: Final = "recovery"
+METADATA_ORIGIN: Final = "origin"
 METADATA_CHUNK_CHANNELS: Final = "chunk_channels"
 
 
@@ -61,6 +62,8 @@ class AttachedFile(NamedTuple):
 
 
 GZIP_FROM: Final = 1024  # bytes; below, packing gains nothing
+MAX_ATTACHMENT_BYTES: Final = 64 << 20  # an attachment that unpacks to more is taken as damaged
+_GZIP_WINDOW: Final = 31  # zlib's number for a gzip frame
 _GZIP_TYPE: Final = "application/gzip; content="
 _GZIP_SUFFIX: Final = ".gz"
 
@@ -78,10 +81,14 @@ def from_stored(stored: AttachedFile) -> AttachedFile:
     name, media_type, data = stored
     if not media_type.startswith(_GZIP_TYPE):
         return stored
+    unpacker = zlib.decompressobj(_GZIP_WINDOW)
     try:
-        plain = gzip.decompress(data)
-    except (OSError, EOFError, zlib.error) as error:
+        plain = unpacker.decompress(data, MAX_ATTACHMENT_BYTES)
+    except zlib.error as error:
         raise ValueError(f"attachment {name}: {error}") from error
+    if not unpacker.eof:
+        reason = "larger than any of ours" if len(plain) == MAX_ATTACHMENT_BYTES else "its end is missing"
+        raise ValueError(f"attachment {name}: {reason}")
     return AttachedFile(name.removesuffix(_GZIP_SUFFIX), media_type.removeprefix(_GZIP_TYPE), plain)
 
 

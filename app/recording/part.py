@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -82,6 +82,8 @@ class Part:
         self.path = path
         self.frames = 0
         self.rejected = 0
+        self.unwritten: list[Frame] = []
+        """The frames that are not in the file because the disk refused."""
         self._file = McapFile(path, library)
         self._packer, self._fast_packer = compressor(Level.LIVE), compressor(Level.BUSY)
         self._channels: dict[tuple[str, MessageType], int] = {}
@@ -129,6 +131,10 @@ class Part:
         name, media_type, data = to_stored(attachment)
         self._file.add_attachment(Attachment(t_ns, t_ns, name, media_type, data))
 
+    def add_metadata(self, name: str, values: Mapping[str, str]) -> None:
+        """A further table of texts; of equal names the last one counts."""
+        self._file.add_metadata(name, values)
+
     def _channel(self, topic: str, message_type: MessageType) -> int:
         key = topic, message_type
         if key not in self._channels:
@@ -138,9 +144,13 @@ class Part:
 
     def append(self, batch: Batch) -> None:
         """Writes a batch: one chunk, one write and one sync for each topic that has messages."""
-        for (bus, is_can), frames in _by_bus(batch.frames).items():
-            for start in range(0, len(frames), CHUNK_FRAMES):
-                self._append_frames(bus, is_can, frames[start : start + CHUNK_FRAMES])
+        pieces = list(_pieces(batch.frames))
+        for n, (bus, is_can, frames) in enumerate(pieces):
+            try:
+                self._append_frames(bus, is_can, frames)
+            except OSError:
+                self.unwritten += (frame for _, _, missing in pieces[n:] for frame in missing)
+                raise
         clocks = [(reading.t_ns, encode_clock(reading)) for reading in batch.clocks]
         states = [(t_ns, encode_texts(t_ns, "", text)) for t_ns, text in batch.keyframes]
         events = [
@@ -155,12 +165,13 @@ class Part:
             body = self._frames_body(bus, is_can, frames)
         except (ValueError, OverflowError):
             good = list(filter(valid, frames))
+            if good:
+                self._append_body(self._frames_body(bus, is_can, good))
             self.rejected += len(frames) - len(good)
-            if not good:
-                return
-            body = self._frames_body(bus, is_can, good)
-        self._append_body(body)
-        self.frames += len(body.times)
+            self.frames += len(good)
+        else:
+            self._append_body(body)
+            self.frames += len(frames)
 
     def _frames_body(self, bus: str, is_can: bool, frames: Sequence[Frame]) -> Body:
         channel_id = self._channel(bus_topic(bus), CAN_FRAME if is_can else TELEGRAM)
@@ -193,6 +204,13 @@ class Part:
 def event_entry(event: Event) -> tuple[Event, str]:
     """An event with its details as JSON. Raises ``TypeError`` or ``ValueError`` where they are not plain."""
     return event, to_json(event.details)
+
+
+def _pieces(frames: Sequence[Frame]) -> Iterator[tuple[str, bool, Sequence[Frame]]]:
+    """Bus by bus what becomes a chunk: its bus, whether it is a CAN bus, and the frames."""
+    for (bus, is_can), group in _by_bus(frames).items():
+        for start in range(0, len(group), CHUNK_FRAMES):
+            yield bus, is_can, group[start : start + CHUNK_FRAMES]
 
 
 def _by_bus(frames: Sequence[Frame]) -> dict[tuple[str, bool], list[Frame]]:

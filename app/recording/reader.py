@@ -7,7 +7,9 @@ damage is an error instead.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import mmap
+import struct
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from heapq import heapify, heappop, heapreplace
 from pathlib import Path
 from types import MappingProxyType
@@ -17,8 +19,10 @@ import numpy as np
 from mcap.records import Attachment, Channel, Chunk, ChunkIndex, Header, Metadata, Schema
 
 from app.errors import RecordingError
+from app.model.description import Description
 from app.recording.cdr import (
     MESSAGE_FIXED,
+    OP_MESSAGE,
     RECORD_PREFIX,
     ClockReading,
     can_dtype,
@@ -29,7 +33,7 @@ from app.recording.cdr import (
     decode_texts,
     frame_id,
 )
-from app.recording.chunks import Body, chunk_data, split_body
+from app.recording.chunks import ANY_CHANNEL, Body, ChunkPlace, chunk_data, read_chunk, split_body
 from app.recording.content import (
     METADATA_BIT_RATES,
     METADATA_CHUNK_CHANNELS,
@@ -45,6 +49,10 @@ from app.recording.content import (
     RecordingInfo,
     from_stored,
 )
+from app.recording.file_bytes import FileBytes
+from app.recording.foreign import is_foreign, read_foreign
+from app.recording.loose import bodies_in, frames_in, messages_in, payloads_in
+from app.recording.node_table import described
 from app.recording.part import Identity
 from app.recording.scan import (
     Bytes,
@@ -65,6 +73,9 @@ from app.recording.summary import MAGIC, Summary
 from app.wire.frame import Direction, Frame
 
 _PREFIX: Final = RECORD_PREFIX.size + MESSAGE_FIXED
+_MESSAGE: Final = bytes((OP_MESSAGE,))
+_AROUND: Final = 1 << 20
+_FRAME_TYPES: Final = (CAN_FRAME.name, TELEGRAM.name)
 _T = TypeVar("_T")
 
 
@@ -74,14 +85,6 @@ class Totals(NamedTuple):
     frames: int
     lost: int
     closed_ns: int
-
-
-class _ChunkAt(NamedTuple):
-    start_ns: int
-    end_ns: int
-    offset: int
-    length: int
-    channel_id: int
 
 
 class Recording:
@@ -94,34 +97,60 @@ class Recording:
     def __init__(self, path: Path, strict: bool = False) -> None:
         self.path = path
         self._strict = strict
-        self._data = _map(path)
+        mapped = _map(path)
+        self._data: Bytes | FileBytes = mapped
         try:
-            self._open()
+            self._open(mapped)
         except BaseException:
             self.close()
             raise
 
-    def _open(self) -> None:
-        check_head(self._data, self.path.name)
-        self.finished = is_finished(self._data)
+    def _open(self, data: Bytes) -> None:
+        check_head(data, self.path.name)
         self.damages: list[Damage] = []
-        self._partial: Body | None = None
-        summary = read_summary(self._data)
-        chunks = None if summary is None else self._by_summary(summary)
-        if chunks is None or summary is None:
-            result = scan(self._data, self.path.name)
-            summary, chunks = self._by_scan(result)
-        self._chunks = sorted(chunks)
-        self.channels: Mapping[int, Channel] = summary.channels
-        self.schemas: Mapping[int, Schema] = summary.schemas
-        self._message_counts = summary.messages
-        self._attachment_spans = [(index.offset, index.length) for index in summary.attachments]
+        self._rest = b""
+        self.foreign = is_foreign(data)
+        if self.foreign:
+            self._open_foreign(data)
+        else:
+            self._open_ours(data)
         recording = self.metadata.get(METADATA_RECORDING, {})
         number = recording.get("schema", str(SCHEMA_NUMBER))
         if number != str(SCHEMA_NUMBER):
             raise self._error(0, f"recording schema {number} is not known")
 
-    def _by_summary(self, summary: Summary) -> list[_ChunkAt] | None:
+    def _open_ours(self, data: Bytes) -> None:
+        self.finished = is_finished(data)
+        summary = read_summary(data)
+        chunks = None if summary is None else self._by_summary(summary)
+        if chunks is None or summary is None:
+            result = scan(data, self.path.name)
+            summary, chunks = self._by_scan(result)
+        self._take(summary, chunks)
+
+    def _open_foreign(self, data: Bytes) -> None:
+        found = read_foreign(data)
+        self.finished = found.finished
+        self.damages.extend(found.damages)
+        self._metadata = found.metadata
+        self._rest = found.partial
+        places = found.places
+        if self._rest:
+            times = messages_in(self._rest).t_ns
+            if len(times):
+                places.append(ChunkPlace(int(times.min()), int(times.max()), found.end, 0, ANY_CHANNEL))
+        self._take(found.summary, places)
+        if self._strict and found.damages:
+            raise self._damage_error(found.summary, found.damages[0], found.end)
+
+    def _take(self, summary: Summary, chunks: list[ChunkPlace]) -> None:
+        self._chunks = sorted(chunks)
+        self.channels: Mapping[int, Channel] = summary.channels
+        self.schemas: Mapping[int, Schema] = summary.schemas
+        self._message_counts = summary.messages
+        self._attachment_spans = [(index.offset, index.length) for index in summary.attachments]
+
+    def _by_summary(self, summary: Summary) -> list[ChunkPlace] | None:
         """The chunks by the summary, or None where it leads nowhere and the file must be scanned."""
         try:
             self._metadata = [parse(Metadata, self._body(index.offset, index.length)) for index in summary.metadata]
@@ -129,28 +158,34 @@ class Recording:
         except ValueError:
             return None
 
-    def _chunk_at(self, index: ChunkIndex, number: int) -> _ChunkAt:
+    def _chunk_at(self, index: ChunkIndex, number: int) -> ChunkPlace:
         channel_id = next(iter(index.message_index_offsets), None)
         if channel_id is None:
             packed = self.metadata.get(METADATA_CHUNK_CHANNELS, {}).get("ids", "").split()
             channel_id = int(packed[number]) if number < len(packed) else self._body_of(_plain(index)).channel_id
         return _plain(index)._replace(channel_id=channel_id)
 
-    def _by_scan(self, result: Scan) -> tuple[Summary, list[_ChunkAt]]:
+    def _by_scan(self, result: Scan) -> tuple[Summary, list[ChunkPlace]]:
         self.damages.extend(result.damages)
         self._metadata = result.metadata
-        self._partial = result.partial
         if self._strict and result.damages:
-            frames = sum(self._is_bus(result.summary, n) * count for n, count in result.summary.messages.items())
-            first = result.damages[0]
-            raise self._error(first.offset, first.detail, recovered_frames=frames, recovered_bytes=result.end)
+            raise self._damage_error(result.summary, result.damages[0], result.end)
         pairs = zip(result.summary.chunks, result.chunk_channels, strict=True)
-        return result.summary, [_plain(index)._replace(channel_id=channel_id) for index, channel_id in pairs]
+        places = [_plain(index)._replace(channel_id=channel_id) for index, channel_id in pairs]
+        if result.partial is not None:
+            self._rest = result.partial.data
+            places.append(_of_body(result.partial, result.end))
+        return result.summary, places
+
+    def _damage_error(self, summary: Summary, first: Damage, end: int) -> RecordingError:
+        frames = sum(self._is_bus(summary, n) * count for n, count in summary.messages.items())
+        return self._error(first.offset, first.detail, recovered_frames=frames, recovered_bytes=end)
 
     @staticmethod
     def _is_bus(summary: Summary, channel_id: int) -> bool:
-        schema = summary.schemas.get(summary.channels[channel_id].schema_id)
-        return schema is not None and schema.name in (CAN_FRAME.name, TELEGRAM.name)
+        channel = summary.channels.get(channel_id)
+        schema = None if channel is None else summary.schemas.get(channel.schema_id)
+        return schema is not None and schema.name in _FRAME_TYPES
 
     def __enter__(self) -> Recording:
         return self
@@ -160,7 +195,22 @@ class Recording:
 
     def close(self) -> None:
         """Closes the file. May be called twice."""
-        unmap(self._data)
+        if isinstance(self._data, FileBytes):
+            self._data.close()
+        else:
+            unmap(self._data)
+
+    def keep(self) -> None:
+        """To be held for long: maps the file no more, for a mapped file that somebody cuts ends the process.
+
+        Raises ``RecordingError`` where it cannot be opened any more.
+        """
+        try:
+            held = FileBytes(self.path)
+        except OSError as error:
+            raise self._error(0, error.strerror or str(error)) from error
+        self.close()
+        self._data = held
 
     # What the file says about itself.
 
@@ -170,10 +220,18 @@ class Recording:
         return MappingProxyType({record.name: record.metadata for record in self._metadata})
 
     @property
+    def descriptions(self) -> Mapping[tuple[str, int], Description]:
+        """What describes the nodes that the file names, by bus and node."""
+        return described(self.metadata.get(METADATA_NODES, {}))
+
+    @property
     def info(self) -> RecordingInfo:
-        """What the recording is of. Raises ``RecordingError`` where the file does not say."""
+        """What the recording is of; nothing is known of files of others.
+
+        Raises ``RecordingError`` where a file of ours does not say.
+        """
         tables = self.metadata
-        recording = tables.get(METADATA_RECORDING)
+        recording = tables.get(METADATA_RECORDING, {} if self.foreign else None)
         if recording is None:
             raise self._error(0, "no recording of this bench")
         return RecordingInfo(
@@ -186,8 +244,11 @@ class Recording:
 
     @property
     def identity(self) -> Identity:
-        """Which file of which recording this is. Raises ``RecordingError`` where the file does not say."""
-        recording = self.metadata.get(METADATA_RECORDING)
+        """Which file of which recording this is; a file of others is the only one of none.
+
+        Raises ``RecordingError`` where a file of ours does not say.
+        """
+        recording = self.metadata.get(METADATA_RECORDING, {"part": "1"} if self.foreign else None)
         if recording is None:
             raise self._error(0, "no recording of this bench")
         number, started_ns, created_ns = (
@@ -209,9 +270,15 @@ class Recording:
         return {channel.topic: self._message_counts.get(number, 0) for number, channel in self.channels.items()}
 
     @property
+    def frame_count(self) -> int:
+        """Number of frames of all buses, by the summary or the scan."""
+        carrying = (n for n, channel in self.channels.items() if self._type_name(channel) in _FRAME_TYPES)
+        return sum(self._message_counts.get(number, 0) for number in carrying)
+
+    @property
     def span_ns(self) -> tuple[int, int] | None:
         """Times of the first and the last frame's chunk borders, or None without frames."""
-        chunks = [chunk for chunk in self._chunks if self._schema_name(chunk) in (CAN_FRAME.name, TELEGRAM.name)]
+        chunks = [chunk for chunk in self._chunks if self._may_hold(chunk, *_FRAME_TYPES)]
         if not chunks:
             return None
         return min(chunk.start_ns for chunk in chunks), max(chunk.end_ns for chunk in chunks)
@@ -233,10 +300,10 @@ class Recording:
     def library(self) -> str:
         """What wrote the file, as its header says."""
         end = len(MAGIC) + RECORD_PREFIX.size
-        length = RECORD_PREFIX.unpack(self._data[len(MAGIC) : end])[1]
         try:
+            length = RECORD_PREFIX.unpack(self._data[len(MAGIC) : end])[1]
             return parse(Header, self._data[end : end + length]).library
-        except ValueError:
+        except (ValueError, struct.error):
             return ""
 
     @property
@@ -256,18 +323,56 @@ class Recording:
         """The content of every chunk by time, with the share of the chunks that is done, 0 to 1."""
         for n, chunk in enumerate(self._chunks, 1):
             try:
-                yield self._body_of(chunk), n / len(self._chunks)
+                data = self.unpacked(chunk)
+                for body in bodies_in(data) if self.foreign else (split_body(data),):
+                    yield body, n / len(self._chunks)
             except ValueError as error:
                 self._damaged(chunk.offset, chunk.length, str(error))
-        if self._partial is not None:
-            yield self._partial, 1.0
+
+    # Chunks of CAN frames, for who reads by columns.
+
+    def can_chunks(self, buses: Collection[str] | None = None) -> list[ChunkPlace]:
+        """The chunks of CAN frames of ``buses`` (None: all) by time; of files of others all chunks."""
+        if self.foreign:
+            return list(self._chunks)
+        return [
+            place
+            for place in self._chunks
+            if self._may_hold(place, CAN_FRAME.name)
+            and (buses is None or self.channels[place.channel_id].topic[1:] in buses)
+        ]
+
+    def unpacked(self, place: ChunkPlace) -> bytes:
+        """The uncompressed records of a chunk. Raises ``ValueError`` where it is damaged."""
+        return chunk_data(self.chunk(place))
+
+    def chunk(self, place: ChunkPlace) -> Chunk:
+        """The chunk as it stands in the file. Raises ``ValueError`` where it is none."""
+        record = self._data[place.offset : place.offset + place.length] if place.length else self._rest
+        if not place.length or record[:1] == _MESSAGE:  # the rest of a cut chunk, or messages outside chunks
+            return Chunk("", record, place.end_ns, place.start_ns, 0, len(record))
+        return read_chunk(record)
+
+    def leave_out(self, place: ChunkPlace, detail: str) -> None:
+        """Lists a chunk that cannot be read in ``damages``; with ``strict`` it raises ``RecordingError``."""
+        self._damaged(place.offset, place.length, detail)
+
+    def release(self, places: Sequence[ChunkPlace]) -> None:
+        """Gives the memory of chunks back that were read and are not needed soon; the file stays mapped."""
+        if not isinstance(self._data, mmap.mmap) or not hasattr(mmap, "MADV_DONTNEED"):
+            return
+        # What stands around a chunk (its message index) was mapped with it, by whole stretches.
+        start = max(0, min(place.offset for place in places) - _AROUND) // mmap.PAGESIZE * mmap.PAGESIZE
+        end = min(len(self._data), max(place.offset + place.length for place in places) + _AROUND)
+        if start >= end:  # a damaged index names a place behind the end of the file
+            return
+        self._data.madvise(mmap.MADV_DONTNEED, start, end - start)
 
     # What was recorded.
 
     def frames(self, start_ns: int | None = None, end_ns: int | None = None) -> Iterator[Frame]:
         """The frames of all buses by time, from ``start_ns`` on and before ``end_ns``."""
-        names = CAN_FRAME.name, TELEGRAM.name
-        return self._merged(lambda chunk: self._schema_name(chunk) in names, self._frames_of, start_ns, end_ns)
+        return self._merged(_FRAME_TYPES, self._foreign_frames if self.foreign else self._frames_of, start_ns, end_ns)
 
     def keyframes(self, start_ns: int | None = None, end_ns: int | None = None) -> Iterator[Keyframe]:
         """The state keyframes by time."""
@@ -294,17 +399,20 @@ class Recording:
     def _messages(
         self, message_type: MessageType, decode: Callable[[bytes], _T], start_ns: int | None, end_ns: int | None
     ) -> Iterator[_T]:
-        return self._merged(
-            lambda chunk: self._schema_name(chunk) == message_type.name,
-            lambda body: ((t_ns, decode(payload)) for t_ns, payload in _payloads(body)),
-            start_ns,
-            end_ns,
-        )
+        def messages(place: ChunkPlace) -> Iterator[tuple[int, _T]]:
+            data = self.unpacked(place)
+            if self.foreign:
+                found: Iterable[tuple[int, bytes]] = payloads_in(data, self.channels, self.schemas, message_type.name)
+            else:
+                found = payloads(split_body(data))
+            return ((t_ns, decode(payload)) for t_ns, payload in found)
+
+        return self._merged((message_type.name,), messages, start_ns, end_ns)
 
     def _merged(
         self,
-        wanted: Callable[[_ChunkAt], bool],
-        decode: Callable[[Body], Iterator[tuple[int, _T]]],
+        names: Collection[str],
+        messages_of: Callable[[ChunkPlace], Iterator[tuple[int, _T]]],
         start_ns: int | None,
         end_ns: int | None,
     ) -> Iterator[_T]:
@@ -312,13 +420,10 @@ class Recording:
         first = -1 if start_ns is None else start_ns
         beyond = 1 << 64 if end_ns is None else end_ns
         waiting: list[tuple[int, int, Iterator[tuple[int, _T]], _T | None]] = [
-            (chunk.start_ns, n, self._chunk_messages(chunk, decode), None)
+            (chunk.start_ns, n, self._chunk_messages(chunk, messages_of), None)
             for n, chunk in enumerate(self._chunks)
-            if wanted(chunk) and chunk.end_ns >= first and chunk.start_ns < beyond
+            if self._may_hold(chunk, *names) and chunk.end_ns >= first and chunk.start_ns < beyond
         ]
-        if self._partial is not None and wanted(_of_body(self._partial)):
-            partial = self._partial
-            waiting.append((int(partial.times[0]), len(self._chunks), decode(partial), None))
         heapify(waiting)
         while waiting:
             t_ns, n, messages, message = waiting[0]
@@ -331,32 +436,40 @@ class Recording:
                 heapreplace(waiting, (following[0], n, messages, following[1]))
 
     def _chunk_messages(
-        self, chunk: _ChunkAt, decode: Callable[[Body], Iterator[tuple[int, _T]]]
+        self, chunk: ChunkPlace, messages_of: Callable[[ChunkPlace], Iterator[tuple[int, _T]]]
     ) -> Iterator[tuple[int, _T]]:
         try:
-            yield from decode(self._body_of(chunk))
+            yield from messages_of(chunk)
         except (ValueError, KeyError) as error:
             self._damaged(chunk.offset, chunk.length, str(error))
 
-    def _frames_of(self, body: Body) -> Iterator[tuple[int, Frame]]:
+    def _foreign_frames(self, place: ChunkPlace) -> Iterator[tuple[int, Frame]]:
+        found = frames_in(self.unpacked(place), self.channels, self.schemas)
+        for reason, count in found.left_out.items():
+            self.leave_out(place, f"{count} messages: {reason}")
+        return ((frame.t_ns, frame) for frame in found.frames)
+
+    def _frames_of(self, place: ChunkPlace) -> Iterator[tuple[int, Frame]]:
+        body = split_body(self.unpacked(place))
         channel = self.channels[body.channel_id]
         if self._type_name(channel) == TELEGRAM.name:
-            return ((t_ns, decode_telegram(payload)) for t_ns, payload in _payloads(body))
+            return ((t_ns, decode_telegram(payload)) for t_ns, payload in payloads(body))
         layout = can_dtype(channel.topic[1:])
         stride = len(body.data) // len(body.times)
         if stride != layout.itemsize or len(body.data) % stride:
-            return ((t_ns, decode_can_payload(payload)) for t_ns, payload in _payloads(body))
+            return ((t_ns, decode_can_payload(payload)) for t_ns, payload in payloads(body))
         records = np.frombuffer(body.data, dtype=layout)
         known = [frame_id(channel.topic[1:], direction).encode() for direction in Direction]
         if not np.isin(records["frame_id"], known).all():
-            return ((t_ns, decode_can_payload(payload)) for t_ns, payload in _payloads(body))
+            return ((t_ns, decode_can_payload(payload)) for t_ns, payload in payloads(body))
         return zip(body.times.tolist(), decode_can(channel.topic[1:], records), strict=True)
 
     # Bytes of the file.
 
-    def _schema_name(self, chunk: _ChunkAt) -> str:
+    def _may_hold(self, chunk: ChunkPlace, *names: str) -> bool:
+        """Whether messages of one of these types can be in a chunk."""
         channel = self.channels.get(chunk.channel_id)
-        return "" if channel is None else self._type_name(channel)
+        return chunk.channel_id == ANY_CHANNEL or (channel is not None and self._type_name(channel) in names)
 
     def _type_name(self, channel: Channel) -> str:
         schema = self.schemas.get(channel.schema_id)
@@ -365,8 +478,8 @@ class Recording:
     def _body(self, offset: int, length: int) -> bytes:
         return self._data[offset + RECORD_PREFIX.size : offset + length]
 
-    def _body_of(self, chunk: _ChunkAt) -> Body:
-        return split_body(chunk_data(parse(Chunk, self._body(chunk.offset, chunk.length))))
+    def _body_of(self, chunk: ChunkPlace) -> Body:
+        return split_body(self.unpacked(chunk))
 
     def _damaged(self, offset: int, length: int, detail: str) -> None:
         if self._strict:
@@ -401,15 +514,15 @@ def _map(path: Path) -> Bytes:
         raise RecordingError(file=path.name, offset=0, reason=error.strerror or str(error)) from error
 
 
-def _plain(index: ChunkIndex) -> _ChunkAt:
-    return _ChunkAt(index.message_start_time, index.message_end_time, index.chunk_start_offset, index.chunk_length, 0)
+def _plain(index: ChunkIndex) -> ChunkPlace:
+    return ChunkPlace(index.message_start_time, index.message_end_time, index.chunk_start_offset, index.chunk_length, 0)
 
 
-def _of_body(body: Body) -> _ChunkAt:
-    return _ChunkAt(int(body.times[0]), int(body.times[-1]), 0, 0, body.channel_id)
+def _of_body(body: Body, offset: int) -> ChunkPlace:
+    return ChunkPlace(int(body.times[0]), int(body.times[-1]), offset, 0, body.channel_id)
 
 
-def _payloads(body: Body) -> Iterator[tuple[int, bytes]]:
+def payloads(body: Body) -> Iterator[tuple[int, bytes]]:
     """Log time and payload of each message."""
     starts: Sequence[int] = body.offsets.tolist()
     ends = [*starts[1:], len(body.data)]

@@ -22,6 +22,7 @@ from app.recording.cdr import RECORD_PREFIX
 from app.recording.chunks import Body, Level, chunk_data, compressor, encode_chunk, message_index, split_body
 from app.recording.content import METADATA_RECOVERY
 from app.recording.file_lock import lock_file
+from app.recording.foreign import is_foreign
 from app.recording.mcap_file import McapFile, sync_directory
 from app.recording.scan import Bytes, Scan, is_finished, map_file, parse, scan, unmap
 from app.recording.schemas import CAN_FRAME, TELEGRAM
@@ -75,7 +76,7 @@ def recover_all(directory: Path, now_ns: int) -> list[Recovery]:
 
 
 def recover(path: Path, now_ns: int) -> Recovery | None:
-    """Recovers one file; None where it is finished or being written. ``now_ns`` goes into the note of the recovery.
+    """Recovers one file; None where it is finished, being written or not ours. ``now_ns`` goes into the note of it.
 
     Raises ``RecordingError`` where the disk refuses.
     """
@@ -101,11 +102,13 @@ def _to_recover(path: Path) -> bool:
     return not is_finished(MAGIC + end if size > len(end) else end)
 
 
-def _recover(path: Path, now_ns: int) -> Recovery:
+def _recover(path: Path, now_ns: int) -> Recovery | None:
     data = map_file(path)
     try:
         if data[: len(MAGIC)] != MAGIC:
             return _set_aside(path, data)
+        if is_foreign(data):
+            return None  # another program's file: it is read as it is, and left as it is
         result = scan(data, path.name)
         rewritten = _cut_last_without_index(data, result)
         without_index = any(not index.message_index_length for index in result.summary.chunks)

@@ -52,6 +52,10 @@ _CHUNK_MARK: Final = b"\x04\x00\x00\x00zstd"
 _CHUNK_MARK_AT: Final = 37  # where the mark stands in a chunk record
 _CHUNK_PACKED_AT: Final = 49  # where the compressed bytes begin in a chunk record
 _DATA_END_SIZE: Final = 13
+_INDEX_HEAD: Final = struct.Struct("<QQQQI")  # a chunk index: times, place and length of the chunk, bytes of the next
+_INDEX_OFFSET: Final = struct.Struct("<HQ")  # topic, place of its message index
+_INDEX_NAME: Final = struct.Struct("<QI")  # length of the message indexes, bytes of the compression's name
+_INDEX_SIZES: Final = struct.Struct("<QQ")
 _UNREADABLE = (McapError, struct.error, ValueError, OverflowError)
 KNOWN_SCHEMAS: Final = {
     number: Schema(id=number, data=known.text.encode(), encoding=SCHEMA_ENCODING, name=known.name)
@@ -346,6 +350,27 @@ def read_summary(data: Bytes) -> Summary | None:
         return None
 
 
+def _chunk_index(body: bytes) -> ChunkIndex:
+    """As ``parse`` does, in a tenth of the time: an hour of a full bus has ten thousand. Raises ``struct.error``."""
+    start_ns, end_ns, offset, length, offsets_size = _INDEX_HEAD.unpack_from(body)
+    at = _INDEX_HEAD.size + offsets_size
+    offsets = dict(_INDEX_OFFSET.iter_unpack(body[_INDEX_HEAD.size : at]))
+    index_length, name_size = _INDEX_NAME.unpack_from(body, at)
+    at += _INDEX_NAME.size
+    compressed, uncompressed = _INDEX_SIZES.unpack_from(body, at + name_size)
+    return ChunkIndex(
+        chunk_length=length,
+        chunk_start_offset=offset,
+        compression=body[at : at + name_size].decode(),
+        compressed_size=compressed,
+        message_end_time=end_ns,
+        message_index_length=index_length,
+        message_index_offsets=offsets,
+        message_start_time=start_ns,
+        uncompressed_size=uncompressed,
+    )
+
+
 def _parse_summary(data: Bytes, at: int, end: int) -> Summary:
     summary = Summary()
     while at < end:
@@ -358,7 +383,7 @@ def _parse_summary(data: Bytes, at: int, end: int) -> Summary:
             channel = parse(Channel, body)
             summary.channels[channel.id] = channel
         elif opcode == Opcode.CHUNK_INDEX:
-            summary.chunks.append(parse(ChunkIndex, body))
+            summary.chunks.append(_chunk_index(body))
         elif opcode == Opcode.ATTACHMENT_INDEX:
             summary.attachments.append(parse(AttachmentIndex, body))
         elif opcode == Opcode.METADATA_INDEX:

@@ -29,6 +29,7 @@ MS: Final = 1_000_000
 WALL_STEP_NS: Final = 5 * MS  # more than the jitter of reading two clocks, less than any step that matters
 READ_BRACKET_NS: Final = MS // 5  # clocks read further apart than this are read again
 MAX_KEPT_EVENTS: Final = 1000
+USUAL_FLUSH_NS: Final = 50 * MS  # what the disk may take for the chunks of one flush before the next comes sooner
 
 
 class RecorderState(Enum):
@@ -129,7 +130,7 @@ class RecorderCore:
         self._part: Part | None = None
         self._file: Path | None = None
         self._since_ns = clock.stamp()
-        self._recording = _new_name(directory, self._since_ns, info.turbine)
+        self._recording = new_name(directory, self._since_ns, info.turbine)
         now_ns = clock.monotonic_ns()
         self._clock_due_ns = self._flush_due_ns = self._keyframe_due_ns = now_ns
         self._part_started_ns = self._retry_due_ns = now_ns
@@ -225,8 +226,16 @@ class RecorderCore:
             self._clock_due_ns = max(self._clock_due_ns + int(self._settings.clock_s * NS), now_ns)
             self._read_clocks()
         if now_ns >= self._flush_due_ns:
-            self._flush_due_ns = now_ns + int(self._settings.flush_s * NS)
             self.flush()
+            took_ns = self._clock.monotonic_ns() - now_ns
+            flush_ns = int(self._settings.flush_s * NS)
+            # What comes while a slow disk is at work waits for it twice: then chunks are closed more often.
+            self._flush_due_ns = now_ns + min(flush_ns, max(flush_ns + USUAL_FLUSH_NS - took_ns, 0))
+
+    def wait_s(self) -> float:
+        """How long until ``cycle`` has something to do."""
+        due_ns = min(self._clock_due_ns, self._flush_due_ns)
+        return max(0, due_ns - self._clock.monotonic_ns()) / NS
 
     def flush(self) -> None:
         """Writes all that is pending, and rotates the file where it is due."""
@@ -252,11 +261,12 @@ class RecorderCore:
         """Writes what is pending and finishes the file. One thread only, once, after the last ``cycle``."""
         with self._lock:
             self._state = RecorderState.CLOSED
-        batch, attachments = self._take_pending()
-        if self._part is None:
-            self._keep_back(batch)
-            return
-        self._append(self._part, batch, attachments)
+        for _ in range(2):  # the second time for what was found wrong with the last frames
+            batch, attachments = self._take_pending()
+            if self._part is None:
+                self._keep_back(batch)
+            elif batch or attachments:
+                self._append(self._part, batch, attachments)
         self._close_part()
 
     def give_up(self, detail: str) -> None:
@@ -290,20 +300,19 @@ class RecorderCore:
             self._lose(batch.frames, LossReason.BLOCKED)
 
     def _append(self, part: Part, batch: Batch, attachments: Sequence[AttachedFile]) -> None:
-        frames_before, rejected_before = part.frames, part.rejected
+        rejected_before, missing = part.rejected, batch.frames
         try:
             for attached in attachments:
                 part.attach(attached, self._clock.stamp())
+            missing = part.unwritten
             part.append(batch)
         except OSError as error:
-            missing = len(batch.frames) - (part.frames - frames_before)
             details = {"error": str(error), "file": part.path.name}
+            self._kept_events.extend(batch.events)  # their chunk is the last, so it is not in the file
             self._kept_events.append(event_entry(Event(self._clock.stamp(), EventKind.DISK_ERROR, "", details)))
             with self._lock:
-                # Chunks go bus by bus: of those that failed only the number is known for sure.
-                self._lose(batch.frames[len(batch.frames) - missing :], LossReason.BLOCKED)
+                self._lose(missing, LossReason.BLOCKED)
             self._block(BlockReason.DISK_ERROR, str(error))
-            return
         rejected = part.rejected - rejected_before
         if rejected:
             times = [frame.t_ns for frame in batch.frames]
@@ -432,7 +441,7 @@ class Recorder(RecorderCore):
 
     def _run(self) -> None:
         try:
-            while not self._stop.wait(self._settings.clock_s):
+            while not self._stop.wait(self.wait_s()):
                 self.cycle()
             self.shut()
         except Exception as error:
@@ -456,7 +465,7 @@ def _read_together(clock: RecorderClock) -> tuple[int, int]:
     return best[1], best[2]
 
 
-def _new_name(directory: Path, t_ns: int, turbine: str) -> str:
+def new_name(directory: Path, t_ns: int, turbine: str) -> str:
     """A name that no recording in the directory bears: ``20250615T120000Z-wtg-07``."""
     moment = datetime.fromtimestamp(t_ns / NS, UTC).strftime("%Y%m%dT%H%M%SZ")
     slug = "".join(c if c.isascii() and (c.isalnum() or c in "-_") else "-" for c in turbine) or "turbine"

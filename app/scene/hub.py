@@ -7,7 +7,7 @@ for itself by the nodes named here (``app.scene.client``).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
 import viser
@@ -181,6 +181,18 @@ class HubScene:
         """Show nothing as known, so that who looks next sees nothing that is over."""
         self.show(dict.fromkeys(BLADES, UNKNOWN_BLADE))
         self.show_rotor(UNKNOWN_ROTOR)
+
+    def played(self, stills: Iterable[tuple[Mapping[int, BladePose], RotorPose, float]]) -> str:
+        """A page that shows ``stills``, each so many seconds long, over and over; what this one shows is its beginning.
+
+        It is one HTML document that loads nothing.
+        """
+        tape = self._server.get_scene_serializer()
+        for blades, rotor, lasts_s in stills:
+            self.show(blades)
+            self.show_rotor(rotor)
+            tape.insert_sleep(lasts_s)
+        return tape.as_html()
 
     def close(self) -> None:
         """Stop the server."""

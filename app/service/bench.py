@@ -14,13 +14,18 @@ from app.service.as_found import REASON, is_whole, look, unreachable, until_back
 from app.service.backup import ReadReport, whole_sets
 from app.service.bitrates import with_bitrates
 from app.service.connection import Connection
+from app.service.indexing import Indexing
 from app.service.instructor import Instructor, InstructorDesk
 from app.service.journal import Journal, Kind
 from app.service.link import TwinWatch
+from app.service.motion.desk import MotionDesk
+from app.service.motion.left import Left
 from app.service.office.office import Office
 from app.service.options import Options
 from app.service.poll import Poller
 from app.service.polling import Polling
+from app.service.recording_list import Recordings, samples_folder
+from app.service.replay.moments import Moments
 from app.service.restore.desk import Desk
 from app.service.site_edit import SiteEditor
 from app.service.sites import Sites
@@ -69,8 +74,17 @@ class Bench:
         self.site_editor = SiteEditor(sites)
         self.polling = Polling(self.office.store)
         self.connection: Connection | None = None
+        self.motion: MotionDesk | None = None
+        self._left = Left(self.office.store)
         self.twins: TwinWatch | None = None
         self.epoch = 0
+        self.indexing = Indexing(None if options.data is None else options.data / "indexes")
+        self.recordings: Recordings | None = None
+        self.moments: Moments | None = None
+        if options.data is not None:
+            folder = options.data / "recordings"
+            self.recordings = Recordings(folder, samples_folder(), options.more_recordings)
+            self.moments = Moments(self.recordings, lambda: sites.turbines, options.data / "indexes")
         self._told = told
         self._clocks = wall_ns, monotonic_ns
         self._changing = asyncio.Lock()
@@ -105,7 +119,7 @@ class Bench:
             await self._end(person)
             found = await with_bitrates(turbine, self.options.listen_s)
             journal = self.journal.by(person)
-            options = replace(self.options, person=person)
+            options = replace(self.options, person=person, part_closed=self.indexing.later)
             connection = Connection(found, descriptions, options, *self._clocks, self.stamper, journal)
             await connection.open(timeout_s)
             await self._keep(self.office.visits.begin(slug, person))
@@ -117,6 +131,7 @@ class Bench:
         """Have ``connection``, which is open, as the one that is served."""
         connection.gate.blocks = self.restores.blocks
         self.connection = connection
+        self.motion = MotionDesk(connection, self.journal, self._left)
         self.twins = TwinWatch(connection.targets, connection.buses, self.instructor is not None)
         self.epoch += 1
 
@@ -163,6 +178,7 @@ class Bench:
         await self.disconnect(self.options.person)
         if self.desk is not None:
             await self.desk.close()
+        await asyncio.to_thread(self.indexing.close)
         await self.office.close()
 
     async def _end(self, person: str) -> None:
@@ -171,7 +187,9 @@ class Bench:
             return
         await self._end_look()
         await self._keep(self.office.visits.keep_left(connection.targets, person))
-        self.connection, self.twins = None, None
+        if self.motion is not None:
+            await self.motion.close()
+        self.connection, self.twins, self.motion = None, None, None
         self.epoch += 1
         self.journal.by(person).note(Kind.DISCONNECTED, None, turbine=connection.turbine.name)
         await connection.close()

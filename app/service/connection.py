@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
 from threading import Lock
 from typing import Any, Final
 
@@ -74,7 +75,8 @@ class Connection:
         """Start recording, then open every bus and listen. Raises BusOpenError; then nothing is left open."""
         try:
             if self._options.recordings is not None:
-                self.recording = Recording(self._options.recordings, self._subject(), self.journal, self._clock)
+                folder, closed = self._options.recordings, self._options.part_closed
+                self.recording = Recording(folder, self._subject(), self.journal, self._clock, closed)
                 for link in self.buses.values():
                     link.sink = self.recording.recorder
             await asyncio.gather(*(link.driver.connect(timeout_s) for link in self.buses.values()))
@@ -108,6 +110,14 @@ class Connection:
         if self.recording is None:
             raise RecordingError(file="", offset=0, reason="nothing is recorded")
         return self.recording.status()
+
+    def recorded_files(self) -> Sequence[Path]:
+        """The files of the running recording, oldest first."""
+        file = None if self.recording is None else self.recording.status().file
+        if file is None:
+            return []
+        series = file.name.rsplit("-", 1)[0]
+        return sorted(file.parent.glob(f"{series}-[0-9][0-9][0-9].mcap"))
 
     # -- devices ----------------------------------------------------------------
 

@@ -30,11 +30,15 @@ class Listed(Generic[_T]):
 
 
 class FileList(Generic[_T]):
-    """The files of ``folder`` that fit ``pattern``, as ``read`` understands them. Safe from any thread."""
+    """The files of ``folder`` that fit ``pattern``, as ``read`` understands them. Safe from any thread.
 
-    def __init__(self, folder: Path, pattern: str, read: Callable[[Path], _T]) -> None:
+    Names that end with ``but`` are left out.
+    """
+
+    def __init__(self, folder: Path, pattern: str, read: Callable[[Path], _T], but: str | None = None) -> None:
         self.folder = folder
         self._pattern = pattern
+        self._but = but
         self._read = read
         self._lock = Lock()
         self._known: dict[str, tuple[int, int, _T]] = {}
@@ -62,9 +66,15 @@ class FileList(Generic[_T]):
         """The file of that name, or None where the list has none: names lead nowhere else."""
         return next((self.folder / known for known, _, _ in self._stats() if known == name), None)
 
+    def of_size(self, size_bytes: int) -> list[Path]:
+        """The files of exactly that size."""
+        return [self.folder / name for name, size, _ in self._stats() if size == size_bytes]
+
     def _stats(self) -> list[tuple[str, int, int]]:
         found = []
         for path in self.folder.glob(self._pattern):
+            if self._but is not None and path.name.endswith(self._but):
+                continue
             try:
                 stat = path.stat()
             except OSError:  # gone since

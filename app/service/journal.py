@@ -43,6 +43,17 @@ class Kind(Enum):
     SCENARIO_STARTED = "scenario_started"
     SCENARIO_STOPPED = "scenario_stopped"
     SCENARIO_ENDED = "scenario_ended"
+    NMT_SENT = "nmt_sent"
+    LEASE_TAKEN = "lease_taken"
+    LEASE_ENDED = "lease_ended"
+    MOTION_PREPARED = "motion_prepared"
+    MOTION_PUT_BACK = "motion_put_back"
+    MOTION_BEGUN = "motion_begun"
+    MOTION_ENDED = "motion_ended"
+    MOTION_STOPPED = "motion_stopped"
+    FAULT_RESET = "fault_reset"
+    HOMED = "homed"
+    INCIDENT_MADE = "incident_made"
     RESTORE_BEGUN = "restore_begun"
     RESTORE_CONFIRMED = "restore_confirmed"
     RESTORE_TURNED_BACK = "restore_turned_back"
@@ -73,6 +84,9 @@ _ERRORS: Final = (
     Kind.RESTORE_INCOMPLETE,
 )
 _WARNINGS: Final = (
+    Kind.MOTION_STOPPED,
+    Kind.MOTION_BEGUN,
+    Kind.NMT_SENT,
     Kind.RESTORE_BEGUN,
     Kind.RESTORE_TURNED_BACK,
     Kind.RESTORE_RESUMED,
@@ -89,6 +103,14 @@ _WARNINGS: Final = (
     Kind.SCENARIO_STARTED,
 )
 _DONE: Final = (
+    Kind.NMT_SENT,
+    Kind.LEASE_TAKEN,
+    Kind.MOTION_PREPARED,
+    Kind.MOTION_PUT_BACK,
+    Kind.MOTION_BEGUN,
+    Kind.FAULT_RESET,
+    Kind.HOMED,
+    Kind.INCIDENT_MADE,
     Kind.RESTORE_BEGUN,
     Kind.RESTORE_CONFIRMED,
     Kind.RESTORE_TURNED_BACK,

@@ -9,11 +9,12 @@ from typing import Final, Literal, Protocol
 from app.drivers.contract import TWIN_NAME, DriverStatus, LinkState
 from app.model.address import Address
 from app.recording.writer import RecorderState, RecorderStatus
+from app.service.bus_feed import BusFeed
 from app.service.devices import Target
 
 DEVICE_NAME: Final = Address(0x1008)
 
-Mode = Literal["live", "twin", "none"]
+Mode = Literal["live", "twin", "none", "replay"]
 LinkName = Literal["connected", "lost", "disconnected"]
 
 _LINK: Final[Mapping[LinkState, LinkName]] = {
@@ -145,6 +146,25 @@ def link_line(buses: Mapping[str, Bus], recording: RecorderStatus | None, twins:
         recording=recording_line(recording),
         other_masters=masters,
         needs_consent=any(each.needs_consent for each, _ in known.values()),
+    )
+
+
+def replay_line(buses: Mapping[str, BusFeed], now_ns: int) -> LinkLine:
+    """The bus as it was at ``now_ns`` of a recording. Of several buses the one with the highest load."""
+    loads = {name: bus.bus_load(now_ns) for name, bus in buses.items()}
+    name = max(loads, key=lambda one: loads[one], default="")
+    return LinkLine(
+        state="connected",
+        reason=None,
+        mode="replay",
+        bus=name,
+        bitrate=buses[name].bitrate if name else 0,
+        load=round(min(1.0, loads.get(name, 0.0)), 3),
+        frames=sum(bus.frames for bus in buses.values()),
+        dropped=0,
+        recording=recording_line(None),
+        other_masters=(),
+        needs_consent=False,
     )
 
 

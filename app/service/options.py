@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,7 +12,7 @@ class Options:
     """``recordings`` None records nothing; ``consent`` allows active access beside another master on the bus.
 
     ``listen_s`` is how long is listened before anything is sent. ``data`` is the folder of what is kept; None keeps
-    nothing.
+    nothing. ``part_closed`` hears of every file of the recording that is complete, on some thread.
     """
 
     person: str
@@ -19,3 +20,5 @@ class Options:
     consent: bool = False
     listen_s: float = 0.5
     data: Path | None = None
+    more_recordings: tuple[Path, ...] = ()
+    part_closed: Callable[[Path], object] | None = None

@@ -13,7 +13,8 @@ from app.model.description import Description
 from app.model.od_export import to_json
 from app.model.sets import ParameterSet, dump_set
 from app.recording.content import AttachedFile, EventKind, RecorderClock, RecordingInfo
-from app.recording.writer import Recorder, RecorderStatus
+from app.recording.writer import BlockReason, Recorder, RecorderStatus
+from app.service.indexing import PartWatch
 from app.service.journal import Entry, Journal, Kind
 
 JSON: Final = "application/json"
@@ -37,9 +38,16 @@ class Subject:
 
 
 class Recording:
-    """A recorder with the journal's events in it. ``start`` to ``stop``."""
+    """A recorder with the journal's events in it. ``closed`` hears of files that are complete."""
 
-    def __init__(self, folder: Path, subject: Subject, journal: Journal, clock: RecorderClock) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        subject: Subject,
+        journal: Journal,
+        clock: RecorderClock,
+        closed: Callable[[Path], object] | None = None,
+    ) -> None:
         info = RecordingInfo(
             turbine=subject.turbine,
             who=subject.person,
@@ -52,7 +60,9 @@ class Recording:
         ]
         self.recorder = Recorder(folder, info, clock, attached)
         self._journal = journal
+        self._parts = PartWatch(closed)
         self._lost = 0
+        self._reason: BlockReason | None = None
         self._stop_listening = journal.listen(self._note)
         journal.note(Kind.RECORDING_STARTED, None, file=str(self.recorder.status().file))
 
@@ -61,17 +71,27 @@ class Recording:
         return self.recorder.status()
 
     def watch(self, state: Callable[[], tuple[int, Mapping[str, Any]]]) -> None:
-        """Call a few times a second: tells losses once, and notes what ``state`` gives as a keyframe where one is due.
+        """Call a few times a second: tells losses once, a stop and its end, and notes a keyframe where one is due.
 
         ``state`` gives the time of the last frame that it holds, and the state.
         """
-        lost = self.recorder.status().lost
-        if lost > self._lost:
-            self._journal.note(Kind.RECORDING_LOST, None, count=lost - self._lost)
-            self._lost = lost
+        status = self.recorder.status()
+        self._parts.look(status.file)
+        self._tell(status)
         if self.recorder.keyframe_due():
             t_ns, now = state()
             self.recorder.keyframe(now, t_ns)
+
+    def _tell(self, status: RecorderStatus) -> None:
+        if status.reason is not self._reason:
+            self._reason = status.reason
+            if status.reason is None:
+                self._journal.note(Kind.RECORDING_STARTED, None, file=str(status.file))
+            else:
+                self._journal.note(Kind.RECORDING_STOPPED, None, reason_key=f"recording_stopped.{status.reason.value}")
+        if status.lost > self._lost:
+            self._journal.note(Kind.RECORDING_LOST, None, count=status.lost - self._lost)
+            self._lost = status.lost
 
     def attach_set(self, parameters: ParameterSet) -> None:
         """Put a parameter set into the recording."""
@@ -81,7 +101,8 @@ class Recording:
     def stop(self, timeout_s: float = 10.0) -> None:
         """Write what is pending and finish the file."""
         self._stop_listening()
-        self.recorder.close(timeout_s)
+        self._parts.look(self.recorder.close(timeout_s).file)
+        self._parts.look(None)
 
     def _note(self, entry: Entry) -> None:
         details = {key: str(value) for key, value in entry.details.items() if key != "bus"}

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from enum import Enum
+from operator import attrgetter
 from pathlib import Path
 from typing import Any, Final
 
 from app.errors import RecordingError
+from app.model.bundled import bundled_folder
+from app.recording.annotations import SUFFIX as ANNOTATIONS
 from app.recording.content import AttachedFile, EventKind
 from app.recording.reader import Recording, open_recording
 from app.recording.scan import is_finished, map_file, unmap
-from app.recording.schemas import EVENTS_TOPIC, FIXED_TOPICS
+from app.recording.schemas import EVENTS_TOPIC
 from app.recording.writer import free_space
 from app.service.file_list import FileList
 
@@ -69,12 +72,13 @@ class Look:
 
 @dataclass(frozen=True, slots=True)
 class RecordingFile:
-    """One file of the list. ``look`` None: not read yet."""
+    """One file of the list. ``look`` None: not read yet; ``sample``: it came with the program."""
 
     name: str
     size_bytes: int
     modified_ns: int
     look: Look | None
+    sample: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,11 +93,21 @@ class RecordingDetails:
     losses: tuple[tuple[int, EventKind, str, Mapping[str, Any]], ...]
 
 
-class Recordings:
-    """The recordings of one folder."""
+def samples_folder() -> Path:
+    """Where the recordings lie that come with the program."""
+    return bundled_folder("recordings", "recordings") / "scenarios"
 
-    def __init__(self, folder: Path) -> None:
-        self._list = FileList(folder, "*.mcap", look_at)
+
+class Recordings:
+    """The recordings of one folder, and behind them those of ``samples``, of which a name in the folder hides one.
+
+    ``more`` are files that lie elsewhere; they go before all others of their name.
+    """
+
+    def __init__(self, folder: Path, samples: Path | None = None, more: Iterable[Path] = ()) -> None:
+        self._list = FileList(folder, "*.mcap", look_at, ANNOTATIONS)
+        self._more = {path.name: path for path in more}
+        self._samples = None if samples is None else FileList(samples, "*.mcap", look_at, ANNOTATIONS)
 
     @property
     def folder(self) -> Path:
@@ -110,11 +124,37 @@ class Recordings:
 
     def files(self, live: Path | None) -> list[RecordingFile]:
         """The files, latest first; ``live`` is the one that is being written. Reads files: not for the event loop."""
-        return [self._file(one.name, one.size_bytes, one.modified_ns, one.content, live) for one in self._list.look()]
+        own = [self._elsewhere(path) for path in self._more.values() if path.is_file()]
+        own += [
+            self._file(one.name, one.size_bytes, one.modified_ns, one.content, live)
+            for one in self._list.look()
+            if one.name not in self._more
+        ]
+        if self._samples is None:
+            return own
+        names = {one.name for one in own}
+        samples = sorted(self._samples.look(), key=attrgetter("name"))
+        return own + [
+            RecordingFile(one.name, one.size_bytes, one.modified_ns, one.content, sample=True)
+            for one in samples
+            if one.name not in names
+        ]
 
     def path(self, name: str) -> Path | None:
         """The file of that name, or None."""
-        return self._list.path(name)
+        own = self._more.get(name) or self._list.path(name)
+        return own if own is not None or self._samples is None else self._samples.path(name)
+
+    def of_size(self, size_bytes: int) -> list[Path]:
+        """The files of exactly that size, in the folder and among the samples."""
+        lists = [self._list] if self._samples is None else [self._list, self._samples]
+        more = [path for path in self._more.values() if path.is_file() and path.stat().st_size == size_bytes]
+        return more + [path for one in lists for path in one.of_size(size_bytes)]
+
+    @staticmethod
+    def _elsewhere(path: Path) -> RecordingFile:
+        stat = path.stat()
+        return RecordingFile(path.name, stat.st_size, stat.st_mtime_ns, look_at(path))
 
     @staticmethod
     def _file(name: str, size: int, modified_ns: int, look: Look | None, live: Path | None) -> RecordingFile:
@@ -167,7 +207,6 @@ def _summary(recording: Recording) -> Summary:
     info, identity, span = recording.info, recording.identity, recording.span_ns
     # An archive tells its totals before its frames: cut off, it would claim what it no longer holds.
     totals = recording.totals if recording.finished else None
-    frames = sum(count for topic, count in recording.topics.items() if topic not in FIXED_TOPICS)
     return Summary(
         turbine=info.turbine,
         person=info.who,
@@ -175,7 +214,7 @@ def _summary(recording: Recording) -> Summary:
         started_ns=identity.created_ns or identity.started_ns or None,
         first_ns=None if span is None else span[0],
         last_ns=None if span is None else span[1],
-        frames=frames if totals is None else totals.frames,
+        frames=recording.frame_count if totals is None else totals.frames,
         lost=None if totals is None else totals.lost,
         events=recording.topics.get(EVENTS_TOPIC, 0),
     )

@@ -1,4 +1,4 @@
-"""From the axes of the live state to the 3D view: poses, and the loop that shows them."""
+"""From the axes of what is shown, the bench or a recording, to the 3D view: poses, and the loop that shows them."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from collections.abc import AsyncIterator
 from typing import Final
 
 from app.scene.hub import BLADES, BladePose, BladeState, HubScene, RotorPose
-from app.service.bench import Bench
 from app.service.rotor_view import NOBODY, RotorLine, rotor_line
+from app.service.shown import Shown
 from app.service.views import AxisLine, axis_lines
 
 log = logging.getLogger(__name__)
@@ -37,7 +37,7 @@ def rotor_pose(line: RotorLine) -> RotorPose:
 
 
 @contextlib.asynccontextmanager
-async def run_scene(shown: Bench | None, scene: HubScene | None) -> AsyncIterator[None]:
+async def run_scene(shown: Shown | None, scene: HubScene | None) -> AsyncIterator[None]:
     """While the block runs, ``scene`` follows ``shown``; nothing where either is None."""
     if shown is None or scene is None:
         yield
@@ -50,9 +50,9 @@ async def run_scene(shown: Bench | None, scene: HubScene | None) -> AsyncIterato
         await asyncio.gather(task, return_exceptions=True)
 
 
-async def follow(bench: Bench, scene: HubScene) -> None:
+async def follow(shown: Shown, scene: HubScene) -> None:
     """Show the axes for ever, thirty times a second while anybody looks. Ends by being cancelled."""
-    feed = SceneFeed(bench, scene)
+    feed = SceneFeed(shown, scene)
     while True:
         try:
             watched = feed.step(asyncio.get_running_loop().time())
@@ -65,8 +65,8 @@ async def follow(bench: Bench, scene: HubScene) -> None:
 class SceneFeed:
     """Brings the scene up to date, step by step. For one thread; the scene must be shown by nobody else."""
 
-    def __init__(self, bench: Bench, scene: HubScene) -> None:
-        self._bench = bench
+    def __init__(self, shown: Shown, scene: HubScene) -> None:
+        self._source = shown
         self._scene = scene
         self._watched = False
         self._seen: tuple[int, int] | None = None
@@ -84,8 +84,8 @@ class SceneFeed:
                 self._rotor = RotorPose()
             self._watched = False
             return False
-        shown = self._bench.connection
-        seen = (self._bench.epoch, -1 if shown is None else shown.live.version)
+        stage = self._source.stage
+        seen = (self._source.epoch, -1 if stage is None else stage.live.version)
         if not self._watched or seen != self._seen or now_s - self._looked_s >= _LOOK_AGAIN_S:
             self._watched, self._seen, self._looked_s = True, seen, now_s
             self._show()
@@ -94,12 +94,12 @@ class SceneFeed:
     def _show(self) -> None:
         """All now; nothing is known of what is not connected."""
         poses, rotor = dict.fromkeys(BLADES, BladePose(None, BladeState.UNKNOWN)), NOBODY
-        shown = self._bench.connection
-        if shown is not None:
-            now_ns = shown.stamper()
-            targets = {target.slug: target for target in shown.targets}
-            poses |= {line.blade: pose(line) for line in axis_lines(shown.turbine, targets, now_ns)}
-            rotor = rotor_line(shown.live, now_ns)
+        stage = self._source.stage
+        if stage is not None:
+            now_ns = self._source.now_ns()
+            targets = {target.slug: target for target in stage.targets}
+            poses |= {line.blade: pose(line) for line in axis_lines(stage.turbine, targets, now_ns)}
+            rotor = rotor_line(stage.live, now_ns)
         self._scene.show(poses)
         self._show_rotor(rotor_pose(rotor))
 

@@ -18,6 +18,7 @@ from typing import Final
 from app.drivers.contract import Driver
 from app.errors import HubsideError, OvertakenError
 from app.model.address import Address
+from app.model.axis_state import AxisState
 from app.model.description import Verify
 from app.service.devices import Target, decode
 from app.service.journal import Journal, Kind
@@ -102,5 +103,5 @@ async def _confirmed(driver: Driver, target: Target, command: Command) -> bool:
     raw = decode(target.entry(STATUSWORD), await driver.read(target.node, STATUSWORD, urgent=True))
     if not isinstance(raw, int):
         return False
-    enabled = raw & 0x6F == 0x27  # operation enabled (CiA 402, table 29)
+    enabled = AxisState.of(raw) is AxisState.OPERATION_ENABLED
     return enabled if command is Command.FEATHER else not enabled

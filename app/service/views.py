@@ -11,6 +11,7 @@ from typing import Any, Final, Literal
 
 from app.errors import ValueTypeError
 from app.model.address import Address
+from app.model.axis_state import AxisState
 from app.model.datatypes import DataType, Raw
 from app.model.description import Entry
 from app.model.site import Station, Turbine
@@ -54,7 +55,7 @@ _NMT: Final[Mapping[NmtState, NmtName]] = {
     NmtState.STOPPED: "stopped",
     NmtState.BOOT_UP: "booting",
 }
-_SOURCE: Final[Mapping[Source, SourceName]] = {
+SOURCE_NAMES: Final[Mapping[Source, SourceName]] = {
     Source.SDO_READ: "sdo-read",
     Source.SDO_WRITE: "sdo-write",
     Source.PDO_TX: "pdo",
@@ -66,17 +67,11 @@ _STOPPED: Final = "axis_state.quick_stop_active"
 _FAULT: Final = ("axis_state.fault", "axis_state.fault_reaction_active")
 _COMPLAINTS: Final = ((STATUSWORD, 1 << 7, 1 << 3), (Address(0x3000), 1 << 1, 1 << 2))
 """Status objects with their bits of warning and of fault (CiA 402, statusword; OAT manual, table 11)."""
-_STATES: Final = (
-    (0x4F, 0x00, "not_ready_to_switch_on"),
-    (0x4F, 0x40, "switch_on_disabled"),
-    (0x6F, 0x21, "ready_to_switch_on"),
-    (0x6F, 0x23, "switched_on"),
-    (0x6F, 0x27, "operation_enabled"),
-    (0x6F, 0x07, "quick_stop_active"),
-    (0x4F, 0x0F, "fault_reaction_active"),
-    (0x4F, 0x08, "fault"),
-)
-"""Mask, bits and name of the states that a statusword shows (CiA 402, statusword)."""
+_STATES: Final = {state: f"axis_state.{state.name.lower()}" for state in AxisState} | {
+    AxisState.NOT_READY: "axis_state.not_ready_to_switch_on",
+    AxisState.READY: "axis_state.ready_to_switch_on",
+}
+"""Text keys of the states that a statusword shows (CiA 402, statusword)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,7 +162,7 @@ class EventLine:
     device: str | None
     text_key: str
     details: Mapping[str, Any]
-    person: str | None = None
+    person: str | None
 
 
 # -- nodes -------------------------------------------------------------------------
@@ -265,7 +260,8 @@ def _demand(devices: list[Target], state: str | None) -> float | None:
 
 def axis_state(status: int) -> str | None:
     """Text key of the state in a statusword; None for bits that no state has."""
-    return next((f"axis_state.{name}" for mask, bits, name in _STATES if status & mask == bits), None)
+    state = AxisState.of(status)
+    return None if state is None else _STATES[state]
 
 
 def _lookups(devices: Iterable[Target], address: Address) -> Iterable[Raw | None]:
@@ -355,7 +351,7 @@ def value_cell(entry: Entry | None, view: ValueView) -> ValueCell:
     if reading is None:
         return ValueCell(None, None, None, None, stored, False, view.stale)
     raw = _raw(entry, reading.data)
-    return ValueCell(raw, reading.data.hex(), reading.t_ns, _SOURCE[reading.source], stored, True, view.stale)
+    return ValueCell(raw, reading.data.hex(), reading.t_ns, SOURCE_NAMES[reading.source], stored, True, view.stale)
 
 
 def _raw(entry: Entry | None, data: bytes) -> RawJson:
@@ -401,7 +397,7 @@ def event_of_wire(event: Event, slugs: Mapping[tuple[str, int], str]) -> EventLi
     if device is None and event.node:
         details["node"] = event.node
     severity: SeverityName = "info" if event.kind is EventKind.ORPHAN else event.severity.value
-    return EventLine(event.t_ns, severity, device, event.text_key, details)
+    return EventLine(event.t_ns, severity, device, event.text_key, details, None)
 
 
 def event_of_journal(entry: JournalEntry) -> EventLine:

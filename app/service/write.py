@@ -5,7 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from app.drivers.contract import Driver, Written
-from app.errors import ConflictError, DeviceError, HubsideError, NoAnswerError, UnverifiedError
+from app.errors import (
+    ConflictError,
+    DeviceError,
+    HubsideError,
+    LimitError,
+    NoAnswerError,
+    PreconditionError,
+    UnverifiedError,
+)
 from app.model.address import Address
 from app.model.checks import Allow, check_write
 from app.model.datatypes import Raw
@@ -42,7 +50,7 @@ async def write_text(
 ) -> WriteResult:
     """As ``write_raw``, for what a person typed (see ``app.model.values.parse``)."""
     entry = target.entry(address)
-    await _know_what_it_rests_on(driver, target, entry)
+    await know_what_it_rests_on(driver, target, entry)
     raw = parse(target.description, entry, text, target.lookup)
     return await write_raw(driver, target, address, raw, journal, allow=allow)
 
@@ -69,8 +77,8 @@ async def write_raw(
     known = driver.commanded(target.node, address) if known is None else known
     entry = target.entry(address)
     await target.pass_gate(driver)
-    await _know_what_it_rests_on(driver, target, entry)
-    data = check_write(target.description, entry, raw, target.lookup, allow=allow)
+    await know_what_it_rests_on(driver, target, entry)
+    data = await _checked(driver, target, entry, raw, allow)
     was = decode(entry, await driver.read(target.node, address, entry.timeout_s)) if entry.access.readable else None
     if expected is not None and was is not None and was != expected:
         raise ConflictError(
@@ -91,7 +99,25 @@ async def write_raw(
     return WriteResult(address, was, raw, read, read is not None or entry.verify is Verify.ACK, how)
 
 
-async def _know_what_it_rests_on(driver: Driver, target: Target, entry: Entry) -> None:
+async def _checked(driver: Driver, target: Target, entry: Entry, raw: Raw, allow: Allow) -> bytes:
+    """The bytes to send. Nothing is refused for what was seen last, but for what the device says when asked again.
+
+    What was seen may be older than an answer that a caller already has: frames reach the live state a little later.
+    """
+    try:
+        return check_write(target.description, entry, raw, target.lookup, allow=allow)
+    except (LimitError, PreconditionError):
+        rests_on = [address for address in depends_on(entry) if address in target.description.entries]
+        if not rests_on:
+            raise
+        answers = await driver.read_many(target.node, rests_on)
+        asked = {a: decode(target.entry(a), answer) for a, answer in answers.items() if isinstance(answer, bytes)}
+        return check_write(
+            target.description, entry, raw, lambda address: asked.get(address, target.lookup(address)), allow=allow
+        )
+
+
+async def know_what_it_rests_on(driver: Driver, target: Target, entry: Entry) -> None:
     """Read the objects that unit, limits and preconditions rest on and that nobody has seen yet."""
     unknown = [a for a in depends_on(entry) if a in target.description.entries and target.lookup(a) is None]
     if unknown:

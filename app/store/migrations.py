@@ -142,6 +142,36 @@ STEPS: Final[tuple[tuple[str, ...], ...]] = (
             for doing in ("UPDATE", "DELETE")
         ),
     ),
+    (
+        """CREATE TABLE incidents (
+            id TEXT PRIMARY KEY NOT NULL, code TEXT NOT NULL UNIQUE, hidden_ns INTEGER, origin TEXT
+        ) STRICT""",
+        """CREATE TABLE incident_versions (
+            incident_id TEXT NOT NULL REFERENCES incidents (id), version INTEGER NOT NULL, t_ns INTEGER NOT NULL,
+            person TEXT NOT NULL, content TEXT NOT NULL, PRIMARY KEY (incident_id, version)
+        ) STRICT""",
+        """CREATE TABLE annotations (
+            id TEXT PRIMARY KEY NOT NULL, recording TEXT NOT NULL, incident_id TEXT REFERENCES incidents (id)
+        ) STRICT""",
+        "CREATE INDEX annotations_recording ON annotations (recording)",
+        """CREATE TABLE annotation_versions (
+            seq INTEGER PRIMARY KEY NOT NULL, annotation_id TEXT NOT NULL REFERENCES annotations (id),
+            t_ns INTEGER NOT NULL, person TEXT NOT NULL, deleted INTEGER NOT NULL, content TEXT NOT NULL
+        ) STRICT""",
+        "CREATE INDEX annotation_versions_of ON annotation_versions (annotation_id, seq)",
+        """CREATE TABLE annotation_files (
+            recording TEXT PRIMARY KEY NOT NULL, sha256 TEXT NOT NULL, t_ns INTEGER NOT NULL
+        ) STRICT""",
+        """CREATE TABLE recording_hashes (
+            fingerprint TEXT PRIMARY KEY NOT NULL, sha256 TEXT NOT NULL, t_ns INTEGER NOT NULL
+        ) STRICT""",
+        *(
+            f"""CREATE TRIGGER {table}_never_{doing.lower()} BEFORE {doing} ON {table}
+            BEGIN SELECT RAISE(ABORT, 'rows of {table} are kept as they are'); END"""
+            for table in ("incident_versions", "annotation_versions")
+            for doing in ("UPDATE", "DELETE")
+        ),
+    ),
 )
 SCHEMA: Final = len(STEPS)
 """The version that this program writes."""

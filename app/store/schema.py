@@ -286,3 +286,63 @@ set_evidence = Table(
     Column("seen", Text, nullable=False),
 )
 """Of a set out of a recording, how each value was seen there. ``seen`` is JSON: address to time and direction."""
+
+incidents = Table(
+    "incidents",
+    metadata,
+    Column("id", Text, primary_key=True),
+    Column("code", Text, nullable=False, unique=True),
+    Column("hidden_ns", Integer),
+    Column("origin", Text),
+)
+"""``code`` is that of short links. ``origin`` is JSON: where an incident came from that was made elsewhere."""
+
+incident_versions = Table(
+    "incident_versions",
+    metadata,
+    Column("incident_id", Text, ForeignKey("incidents.id"), primary_key=True),
+    Column("version", Integer, primary_key=True),
+    Column("t_ns", Integer, nullable=False),
+    Column("person", Text, nullable=False),
+    Column("content", Text, nullable=False),
+)
+"""``content`` is JSON. Rows never change."""
+
+recording_annotations = Table(
+    "annotations",
+    metadata,
+    Column("id", Text, primary_key=True),
+    Column("recording", Text, nullable=False),
+    Column("incident_id", Text, ForeignKey("incidents.id")),
+)
+"""Marks on a recording, named by its file."""
+
+annotation_versions = Table(
+    "annotation_versions",
+    metadata,
+    Column("seq", Integer, primary_key=True),
+    Column("annotation_id", Text, ForeignKey("annotations.id"), nullable=False),
+    Column("t_ns", Integer, nullable=False),
+    Column("person", Text, nullable=False),
+    Column("deleted", Integer, nullable=False),
+    Column("content", Text, nullable=False),
+)
+"""A history: of each annotation the newest row counts. ``content`` is JSON."""
+
+annotation_files = Table(
+    "annotation_files",
+    metadata,
+    Column("recording", Text, primary_key=True),
+    Column("sha256", Text, nullable=False),
+    Column("t_ns", Integer, nullable=False),
+)
+"""What was last written beside each recording, so that a file of another hand is noticed."""
+
+recording_hashes = Table(
+    "recording_hashes",
+    metadata,
+    Column("fingerprint", Text, primary_key=True),
+    Column("sha256", Text, nullable=False),
+    Column("t_ns", Integer, nullable=False),
+)
+"""The hash of a whole file by that of its ends and its size: a large file is read once."""

@@ -13,14 +13,18 @@ from app import __version__
 from app.model.texts import load_texts
 from app.scene.hub import HubScene
 from app.service.bench import Bench
+from app.service.indexing import Indexing
 from app.service.instructor import watched
 from app.service.jobs import Jobs
+from app.service.replay.replays import Replays
+from app.service.replay_scenes import ReplayScenes
 from app.service.scene_feed import run_scene
+from app.service.shown import LiveShown
 from app.web import problem
 from app.web.access import Access
 from app.web.guard import LOOPBACK_NAMES, Guard, Reach
 from app.web.problem import NotFoundError
-from app.web.routes import api_router
+from app.web.routes import api_router, incidents
 from app.web.socket import serve_client
 from app.web.static import PageFiles, page_folder
 from app.web.viser_proxy import viser_router
@@ -42,13 +46,15 @@ def create_app(
     app = create_api(bench, scene, language)
     app.state.access = access
     files = PageFiles(page or page_folder())
+    replays: Replays = app.state.replays
 
     @app.websocket("/api/ws")
     async def socket(websocket: WebSocket) -> None:
-        await serve_client(websocket, bench, time.monotonic)
+        await serve_client(websocket, LiveShown(bench), replays, time.monotonic, lambda: bench.motion)
 
+    app.include_router(incidents.links)
     if scene is not None:
-        app.include_router(viser_router(scene))
+        app.include_router(viser_router(scene, app.state.replay_scenes))
 
     @app.get("/{path:path}", include_in_schema=False)
     async def page_file(request: Request, path: str) -> Response:
@@ -67,7 +73,14 @@ def create_api(bench: Bench | None, scene: HubScene | None = None, language: str
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         app.state.jobs = Jobs()
-        async with run_scene(bench, scene), watched(None if bench is None else bench.desk):
+        live = None if bench is None else LiveShown(bench)
+        desk = None if bench is None else bench.desk
+        async with (
+            run_scene(live, scene),
+            watched(desk),
+            app.state.replays.running(),
+            app.state.replay_scenes.running(),
+        ):
             yield
         await app.state.jobs.close()
 
@@ -81,7 +94,17 @@ def create_api(bench: Bench | None, scene: HubScene | None = None, language: str
         generate_unique_id_function=lambda route: route.name,
     )
     app.state.bench = bench
+    app.state.replays = _replays(bench)
+    app.state.replay_scenes = ReplayScenes(app.state.replays.shown)
     app.state.language = language
     app.include_router(api_router())
     problem.install(app)
     return app
+
+
+def _replays(bench: Bench | None) -> Replays:
+    """Replays with the names of the turbines that the bench knows; indexes lie in its data folder."""
+    if bench is None:
+        return Replays(dict, Indexing())
+    data = bench.options.data
+    return Replays(lambda: bench.sites.turbines, bench.indexing, None if data is None else data / "indexes")

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Annotated, Any
 
-from fastapi import Depends, Request
+from fastapi import APIRouter, Depends, Request
 
-from app.errors import RoleError
+from app.errors import NotConnectedError, RoleError
 from app.model.roles import Role, SignedIn
 from app.service.bench import Bench
 from app.service.connection import Connection
 from app.service.devices import Target
 from app.service.jobs import Jobs
 from app.service.journal import Journal
+from app.service.replay.replays import Replays
+from app.service.replay.session import Session
+from app.service.shown import LiveShown, Shown
+from app.service.stage import Stage
 from app.service.views import device_state
 from app.web.guard import SIGNED_IN
 from app.web.models import Problem
@@ -51,6 +56,59 @@ def get_signed_in(request: Request) -> SignedIn:
     if person is None:
         raise UnauthorisedError
     return person
+
+
+def get_replays(request: Request) -> Replays:
+    """The replays of this server."""
+    replays: Replays = request.app.state.replays
+    return replays
+
+
+ReplaysOf = Annotated[Replays, Depends(get_replays)]
+
+
+def get_session(replays: ReplaysOf, replay_id: str) -> Session:
+    """The replay of the path. Raises ReplayEndedError, or what it has ended by."""
+    return replays.require(replay_id)
+
+
+SessionOf = Annotated[Session, Depends(get_session)]
+
+
+def get_shown(request: Request, bench: BenchOf, replays: ReplaysOf) -> Shown:
+    """What is shown: the replay where the path names one, else the live bench. Raises as ``get_session`` does."""
+    name = request.path_params.get("replay_id")
+    return LiveShown(bench) if name is None else replays.require(name)
+
+
+ShownOf = Annotated[Shown, Depends(get_shown)]
+
+
+def get_stage(shown: ShownOf) -> Stage:
+    """Its devices and what is known of them. Raises NotConnectedError."""
+    stage = shown.stage
+    if stage is None:
+        raise NotConnectedError
+    return stage
+
+
+StageOf = Annotated[Stage, Depends(get_stage)]
+
+
+def name_replay(replay_id: str) -> None:
+    """Has the path of a replay's route documented."""
+
+
+def reads_both(router: APIRouter, path: str, endpoint: Callable[..., Any]) -> None:
+    """A read route of the live bench and of every replay: ``/live/<path>`` and ``/replay/{replay_id}/<path>``."""
+    router.add_api_route(f"/live/{path}", endpoint, methods=["GET"])
+    router.add_api_route(
+        f"/replay/{{replay_id}}/{path}",
+        endpoint,
+        methods=["GET"],
+        name=f"replay_{endpoint.__name__}",
+        dependencies=[Depends(name_replay)],
+    )
 
 
 ConnectionOf = Annotated[Connection, Depends(get_connection)]

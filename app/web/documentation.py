@@ -62,6 +62,37 @@ OF_A_DEVICE: Final[tuple[HubsideError, ...]] = (
 BODIES: Final[dict[str, Any]] = {
     "Nothing": {},
     "ConnectRequest": {"turbine": "wtg-07"},
+    "OpenReplayRequest": {"recording": "3-following-error.mcap"},
+    "MomentSetsRequest": {"devices": ["wtg-07/blade-2/pmc"], "reason": "before the trip"},
+    "SignatureRequest": {"text": "60F4 > 2 deg within 5 s before emcy 8611"},
+    "RecordingSearchRequest": {
+        "query": {
+            "type": "pair",
+            "left": {"type": "level", "object": "60F4", "comparison": ">", "number": 2, "unit": "°"},
+            "order": "before",
+            "right": {"type": "event", "kind": "emcy", "code": 0x8611},
+            "within_ms": 5000,
+        },
+        "recordings": ["3-following-error.mcap"],
+    },
+    "AlignRequest": {
+        "recordings": [
+            {"name": "3-following-error.mcap", "trip": 0},
+            {"name": "5-bloc-ageing.mcap", "t_ns": 1772449260945239552},
+        ],
+        "signals": [{"address": "6064", "device": "pmc"}, {"address": "60F4", "blade": 2}],
+        "before_ms": 5000,
+        "after_ms": 15000,
+    },
+    "CutRequest": {"start_ns": 1772449240000000000, "end_ns": 1772449250000000000, "buses": ["can0"]},
+    "MergeRequest": {
+        "recordings": [
+            {"name": "3-following-error.mcap"},
+            {"name": "5-bloc-ageing.mcap", "offset_ns": 3600000000000, "buses": {"can0": "can1"}},
+        ]
+    },
+    "AnonymiseRequest": {"hide_times": True, "objects": ["2105:01"], "words": ["wtg-07"]},
+    "CursorRequest": {"action": "step", "by": "event", "forward": True},
     "ReadRequest": {"addresses": ["6064", "3110:01"]},
     "WriteRequest": {"address": "3110:01", "raw": 490},
     "WritesRequest": {

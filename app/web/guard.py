@@ -19,7 +19,7 @@ from collections.abc import Awaitable, Callable, Iterable, MutableMapping
 from dataclasses import dataclass
 from html import escape
 from typing import Any, Final
-from urllib.parse import parse_qs
+from urllib.parse import parse_qs, urlencode
 
 from app.errors import HubsideError, LoginNeededError
 from app.service.office.sessions import Session
@@ -56,6 +56,11 @@ MAX_BODY: Final = 65_536
 MAX_FILE: Final = 12 * 1024 * 1024
 """Of a request that brings a file, in bytes."""
 _BRINGS_FILE: Final = ("/api/sets/import",)
+MAX_RECORDING: Final = 4 << 30
+"""Of a request that brings a recording, in bytes: eight full parts."""
+_STREAMED: Final = ("/api/recordings/import", "/api/incidents/import")
+"""Bring a recording or a bundle, which the route counts while it goes to the disk."""
+_OCTETS: Final = "application/octet-stream"
 _WITH_BODY: Final = ("POST", "PUT", "PATCH")
 _FOREIGN: Final = ("cross-site", "same-site")
 _COMMON: Final = "default-src 'self'; base-uri 'none'; form-action 'none'; object-src 'none'"
@@ -110,7 +115,7 @@ class Guard:
             else:
                 await _refuse(scope, headers, send, LoginNeededError())
         elif secret := await self._launched(scope):
-            await _redirect(send, self._access.cookie(secret))
+            await _redirect(send, _landing(scope), self._access.cookie(secret))
         else:
             await _refuse(scope, headers, send, UnauthorisedError(), self._sign_in_text)
 
@@ -128,8 +133,10 @@ class Guard:
         opens_page = not socket and method == "GET" and headers.get("sec-fetch-dest") == "document"
         if headers.get("sec-fetch-site") in _FOREIGN and not opens_page:
             return ForbiddenHostError(host=host, origin=headers["sec-fetch-site"])
-        if method in _WITH_BODY and _media_type(headers) != "application/json":
-            return InvalidRequestError(reason=f"Content-Type '{_media_type(headers)}' is not application/json")
+        # A foreign page can send neither of them without asking first.
+        wanted = _OCTETS if scope["path"] in _STREAMED else "application/json"
+        if method in _WITH_BODY and _media_type(headers) != wanted:
+            return InvalidRequestError(reason=f"Content-Type '{_media_type(headers)}' is not {wanted}")
         length = headers.get("content-length", "")
         most = largest_body(str(scope["path"]))
         if length.isdecimal() and int(length) > most:
@@ -156,7 +163,8 @@ class Guard:
 
     async def _pass(self, scope: Scope, receive: Receive, send: Send, headers: dict[str, str]) -> None:
         if _token(scope) is not None:
-            await _redirect(send)  # opened again, or where it opens nothing any more: it must leave the address bar
+            # Opened again, or where it opens nothing any more: it must leave the address bar.
+            await _redirect(send, _landing(scope))
             return
         extra = security_headers(str(scope["path"]), headers["host"], self._reach.secure)
 
@@ -167,7 +175,7 @@ class Guard:
                 message = {**message, "headers": [*message.get("headers", []), *added]}
             await send(message)
 
-        if scope.get("method") not in _WITH_BODY:
+        if scope.get("method") not in _WITH_BODY or scope["path"] in _STREAMED:
             await self._app(scope, receive, secured)
             return
         most = largest_body(str(scope["path"]))
@@ -236,6 +244,8 @@ def _is_open(scope: Scope) -> bool:
 
 def largest_body(path: str) -> int:
     """How many bytes a request to ``path`` may bring."""
+    if path in _STREAMED:
+        return MAX_RECORDING
     return MAX_FILE if path in _BRINGS_FILE else MAX_BODY
 
 
@@ -315,8 +325,15 @@ def _token(scope: Scope) -> str | None:
     return next(iter(parse_qs(scope["query_string"].decode("latin-1")).get("token", [])), None)
 
 
-async def _redirect(send: Send, cookie: str | None = None) -> None:
-    headers: Headers = [(b"location", b"/"), (b"cache-control", b"no-store"), (b"referrer-policy", b"no-referrer")]
+def _landing(scope: Scope) -> str:
+    """Where the launch address leads: to the replay that it names, else to the first room."""
+    replay = next(iter(parse_qs(scope["query_string"].decode("latin-1")).get("replay", [])), None)
+    return "/" if replay is None else f"/recordings?{urlencode({'replay': replay})}"
+
+
+async def _redirect(send: Send, location: str, cookie: str | None = None) -> None:
+    headers: Headers = [(b"cache-control", b"no-store"), (b"referrer-policy", b"no-referrer")]
+    headers.append((b"location", location.encode("ascii")))
     if cookie is not None:
         headers.append((b"set-cookie", cookie.encode()))
     await _answer(send, "http", 303, headers, b"")

@@ -1,5 +1,6 @@
-"""The 3D view under ``/viser``: the client's page and its socket, passed on to the 3D server behind our guard.
+"""The 3D views under ``/viser``: the client's page and its socket, passed on to a 3D server behind our guard.
 
+``/viser/`` shows the bench, ``/viser/replay/<id>/`` a recording; each has a 3D server of its own.
 The 3D server answers only to the secret that is added here. Its page is shown bare: nothing but the canvas.
 """
 
@@ -8,11 +9,14 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+from collections.abc import Awaitable, Callable
 from typing import Final
+from urllib.parse import quote
 
 import httpx
 import websockets
 from fastapi import APIRouter, Request, Response, WebSocket, WebSocketDisconnect
+from fastapi.requests import HTTPConnection
 from fastapi.responses import RedirectResponse
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.typing import Subprotocol
@@ -20,6 +24,7 @@ from websockets.typing import Subprotocol
 from app.scene.client import bare_page
 from app.scene.hub import HubScene
 from app.scene.server import SECRET_HEADER
+from app.service.replay_scenes import ReplayScenes
 from app.web.problem import NotFoundError, SceneGoneError
 
 log = logging.getLogger(__name__)
@@ -28,30 +33,51 @@ TIMEOUT_S: Final = 10.0
 _UPSTREAM: Final = "127.0.0.1"
 
 
-def viser_router(scene: HubScene) -> APIRouter:
-    """The routes of one 3D server."""
-    proxy = _Proxy(scene)
+Find = Callable[[HTTPConnection], Awaitable[HubScene]]
+"""The 3D view that is asked for. Raises NotFoundError."""
+
+
+def viser_router(scene: HubScene, replays: ReplayScenes) -> APIRouter:
+    """The routes of the bench's 3D server and of those of replays."""
+
+    async def live(_asked: HTTPConnection) -> HubScene:
+        return scene
+
+    async def replay(asked: HTTPConnection) -> HubScene:
+        name = str(asked.path_params["replay_id"])
+        found = await replays.scene(name)
+        if found is None:
+            raise NotFoundError(what=name)
+        return found
+
     router = APIRouter(include_in_schema=False)
-    router.add_api_route("/viser", proxy.with_slash, methods=["GET"])
-    router.add_api_route("/viser/{path:path}", proxy.page, methods=["GET"])
-    # The client drops the trailing slash of its own address; proxies and people add it.
-    router.add_api_websocket_route("/viser", proxy.socket)
-    router.add_api_websocket_route("/viser/", proxy.socket)
+    # What is more particular comes first: the bench's path takes any file.
+    _add(router, "/viser/replay/{replay_id}", _Proxy(replay))
+    _add(router, "/viser", _Proxy(live))
     return router
 
 
+def _add(router: APIRouter, path: str, proxy: _Proxy) -> None:
+    router.add_api_route(path, proxy.with_slash, methods=["GET"])
+    router.add_api_route(f"{path}/{{path:path}}", proxy.page, methods=["GET"])
+    # The client drops the trailing slash of its own address; proxies and people add it.
+    router.add_api_websocket_route(path, proxy.socket)
+    router.add_api_websocket_route(f"{path}/", proxy.socket)
+
+
 class _Proxy:
-    def __init__(self, scene: HubScene) -> None:
-        self._scene = scene
+    def __init__(self, find: Find) -> None:
+        self._find = find
 
     async def with_slash(self, request: Request) -> Response:
         query = f"?{request.url.query}" if request.url.query else ""
-        return RedirectResponse(f"/viser/{query}", 307)
+        return RedirectResponse(f"{quote(request.url.path)}/{query}", 307)
 
     async def page(self, request: Request, path: str) -> Response:
         """A file of the client. Raises NotFoundError or SceneGoneError."""
-        url = f"http://{_UPSTREAM}:{self._scene.port}/{path}"
-        headers = {SECRET_HEADER: self._scene.secret, "Accept-Encoding": "identity"}
+        scene = await self._find(request)
+        url = f"http://{_UPSTREAM}:{scene.port}/{path}"
+        headers = {SECRET_HEADER: scene.secret, "Accept-Encoding": "identity"}
         try:
             async with httpx.AsyncClient(trust_env=False, timeout=TIMEOUT_S) as client:
                 answer = await client.get(url, headers=headers)
@@ -65,13 +91,18 @@ class _Proxy:
 
     async def socket(self, socket: WebSocket) -> None:
         """Pass frames on in both directions until either side closes. Frames may be of any size."""
+        try:
+            scene = await self._find(socket)
+        except NotFoundError:
+            await socket.close(1013, "the replay is not open")
+            return
         offered = [Subprotocol(name) for name in socket.scope.get("subprotocols", [])]
-        url = f"ws://{_UPSTREAM}:{self._scene.port}/"
+        url = f"ws://{_UPSTREAM}:{scene.port}/"
         try:
             upstream = await connect(
                 url,
                 subprotocols=offered or None,
-                additional_headers={SECRET_HEADER: self._scene.secret},
+                additional_headers={SECRET_HEADER: scene.secret},
                 max_size=None,
                 compression=None,
                 proxy=None,

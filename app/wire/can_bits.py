@@ -105,3 +105,16 @@ def frame_bits(can: Can) -> int:
     item = _BIT7[item & 0x700 | crc >> 8]
     stuffed = total + item + _BIT8[item & 0x700 | crc & 0xFF]
     return (stuffed >> _COUNT_SHIFT) + (total & 0xFFFF) + 15 + TRAILER_BITS
+
+
+def header_bits(can_id: int, length: int, extended: bool, remote: bool) -> tuple[int, int, int]:
+    """For who counts whole columns of frames: CRC, item of the stuffing machine and its sum behind the DLC.
+
+    Raises ValueError where the frame cannot exist.
+    """
+    return _header(can_id, length, extended, remote)
+
+
+def byte_tables() -> tuple[list[int], list[int], list[int]]:
+    """The tables that ``frame_bits`` goes on with: CRC by byte, stuffing by 8 bits and by 7."""
+    return _CRC8, _BIT8, _BIT7

@@ -85,6 +85,8 @@ class CanOpenDecoder:
         }
         self._routes: dict[int, tuple[_Handler, Any]] = {}
         self._speakers: dict[int, Speaker] = {}
+        self.layouts = 0
+        """Counts how often the meaning of identifiers was found out anew: equal counts, equal ``speakers``."""
         self._route()
 
     def set_description(self, node: int, description: Description | None) -> None:
@@ -130,6 +132,24 @@ class CanOpenDecoder:
         """Who follows the transfers of ``node``. Raises KeyError outside 1..127."""
         return self._nodes[node].sdo
 
+    def state(self, node: int) -> NmtState | None:
+        """NMT state of ``node`` as heard last, None where nothing told it. Raises KeyError outside 1..127."""
+        return self._nodes[node].state
+
+    def service_ids(self) -> list[tuple[int, int, int, bool]]:
+        """Of every node the identifiers of SDO request, SDO response and EMCY, and whether all are predefined."""
+        return [node.layout[:4] for node in self._nodes.values()]
+
+    def speakers(self) -> dict[int, Speaker]:
+        """Whose every identifier is that ``feed`` listens to; extended ones plus 2^29."""
+        services = self._services()
+        found = {}
+        for key, (handler, target) in self._routes.items():
+            service = services.get(handler)
+            number = 0 if target is None or service is None else target.number
+            found[key] = self._who(key, key) if service is None else Speaker(service, number)
+        return found
+
     def speaker(self, can_id: int, extended: bool = False) -> Speaker:
         """Whose identifier this is by what is known now, else by the predefined connection set."""
         if extended:
@@ -148,7 +168,11 @@ class CanOpenDecoder:
             sender = next((one for one in target if not one.received), target[0])
             service = Service.RPDO if sender.received else Service.TPDO
             return Speaker(service, sender.node.number, sender.route.number)
-        service = {
+        return Speaker(self._services()[handler], 0 if target is None else target.number)
+
+    def _services(self) -> dict[_Handler, Service]:
+        """The services but for PDOs, by who handles them."""
+        return {
             self._on_sdo_request: Service.SDO_REQUEST,
             self._on_sdo_response: Service.SDO_RESPONSE,
             self._on_emcy: Service.EMCY,
@@ -156,8 +180,7 @@ class CanOpenDecoder:
             self._on_nmt: Service.NMT,
             self._on_sync: Service.SYNC,
             self._on_environment: Service.TWIN,
-        }[handler]
-        return Speaker(service, 0 if target is None else target.number)
+        }
 
     # -- routes ----------------------------------------------------------------
 
@@ -191,6 +214,7 @@ class CanOpenDecoder:
         routes[twin_environment.CAN_ID | _EXTENDED] = (self._on_environment, None)
         self._routes = routes
         self._speakers.clear()
+        self.layouts += 1
 
     # -- services --------------------------------------------------------------
 

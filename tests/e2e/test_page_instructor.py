@@ -248,13 +248,18 @@ def test_stop_and_feather_keep_their_place_beside_the_mark(demo: Demo) -> None:
         page = demo.open(f"?lang={language}")
         expect(page.get_by_test_id("injected")).to_be_visible()
         expect(page.get_by_test_id("recording")).to_be_attached()
-        for width, height in ((1920, 1080), (1366, 768), (1341, 768), (1241, 768), (1024, 768), (820, 1180)):
-            page.set_viewport_size({"width": width, "height": height})
-            for name in ("stop", "feather", "injected"):
-                box = page.get_by_test_id(name).bounding_box()
-                assert box is not None
-                assert box["x"] >= 0 and box["x"] + box["width"] <= width, (language, width, name)
-                assert box["height"] >= 40
+        for facts in ("as they are", "an hour of two full buses"):
+            if facts != "as they are":  # digits come and go with the traffic; the longest there can be must not matter
+                page.locator("[data-testid=bus] strong, [data-testid=recording] strong").evaluate_all(
+                    "found => found.forEach(one => one.append(' 1.234.567,8 MB · 98.765 Frames/s'))"
+                )
+            for width, height in ((1920, 1080), (1366, 768), (1341, 768), (1241, 768), (1024, 768), (820, 1180)):
+                page.set_viewport_size({"width": width, "height": height})
+                for name in ("stop", "feather", "injected"):
+                    box = page.get_by_test_id(name).bounding_box()
+                    assert box is not None
+                    assert box["x"] >= 0 and box["x"] + box["width"] <= width, (language, facts, width, name)
+                    assert box["height"] >= 40
         page.close()
 
 

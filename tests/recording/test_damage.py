@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from pathlib import Path
 
 import pytest
+import zstandard
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from app.errors import RecordingError
+from app.recording.chunks import COMPRESSION, MAX_CHUNK_BYTES, partial_data
 from app.recording.content import AttachedFile
 from app.recording.reader import open_recording
 from app.recording.recover import RecoveryKind, recover, recover_all
@@ -155,3 +158,15 @@ def test_a_crash_while_the_repaired_copy_takes_the_name_is_made_good(
     (tmp_path / "r-001.mcap.damaged").write_bytes(b"the original")
     assert recover_all(tmp_path, 0) == []
     assert frames_of(tmp_path / "r-001.mcap") == frames
+
+
+def test_the_beginning_of_a_chunk_that_swells_beyond_measure_is_left_alone() -> None:
+    packed = zstandard.compress(bytes(4 * MAX_CHUNK_BYTES))
+    tracemalloc.start()
+    try:
+        assert partial_data(packed[:-4], COMPRESSION) == b""
+        assert tracemalloc.get_traced_memory()[1] < 2.5 * MAX_CHUNK_BYTES
+    finally:
+        tracemalloc.stop()
+    assert partial_data(zstandard.compress(bytes(1 << 20))[:-4], COMPRESSION).strip(b"\0") == b""
+    assert len(partial_data(zstandard.compress(bytes(1 << 20)), COMPRESSION)) == 1 << 20

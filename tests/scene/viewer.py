@@ -17,7 +17,7 @@ from app.scene.hub import HubScene
 from app.scene.server import SECRET_HEADER
 
 PROTOCOL = websockets.Subprotocol(f"viser-v{viser.__version__}")
-_CAMERA: dict[str, Any] = {
+CAMERA: dict[str, Any] = {
     "type": "ViewerCameraMessage", "wxyz": (1.0, 0.0, 0.0, 0.0), "position": (0.0, 0.0, 9.0), "image_height": 9,
     "image_width": 9, "fov": 1.0, "near": 0.1, "far": 99.0, "look_at": (0.0, 0.0, 0.0), "up_direction": (0.0, 0.0, 1.0),
 }  # fmt: skip
@@ -60,7 +60,7 @@ async def viewing(scene: HubScene) -> AsyncIterator[Viewer]:
     async with connect(url, subprotocols=[PROTOCOL], additional_headers=secret, proxy=None, max_size=None) as socket:
         viewer = Viewer(socket)
         hearing = asyncio.create_task(viewer.hear())
-        await socket.send(msgspec.msgpack.encode(_CAMERA))
+        await socket.send(msgspec.msgpack.encode(CAMERA))
         yield viewer
         hearing.cancel()
 

@@ -13,6 +13,7 @@ from app.scene.hub import BladeState, HubScene, RotorPose
 from app.scene.solids import quaternion
 from app.service.rotor_view import NOBODY, RotorLine, rotor_line
 from app.service.scene_feed import SceneFeed, rotor_pose
+from app.service.shown import LiveShown
 from app.wire.frame import Can, Direction, Frame
 from app.wire.live import LiveState
 from app.wire.records import EnvironmentSeen
@@ -33,7 +34,7 @@ class Rig:
         self.bench = bench_with(self.connection)
         self.feeder = Feeder(self.connection)
         self.scene = scene
-        self.feed = SceneFeed(self.bench, scene)
+        self.feed = SceneFeed(LiveShown(self.bench), scene)
 
     def angle(self, node: int, cdeg: int) -> None:
         """Somebody reads the angle of an axis that is enabled."""

@@ -110,6 +110,20 @@ async def test_a_precondition_is_read_from_the_device(connection: Connection) ->
     assert caught.value.details["needs"] == "6061 = 6"
 
 
+async def test_nothing_is_refused_for_what_was_seen_before(
+    connection: Connection, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Frames reach the live state later than their answers reach who asked: the device is asked again."""
+    seen, shown = Target.lookup, Address(0x6061)
+    monkeypatch.setattr(Target, "lookup", lambda self, a: 1 if a == shown else seen(self, a))
+    target = connection.target(PMC)
+    driver = connection.driver(target)
+    await driver.write(11, Address(0x6060), b"\x06")
+    while await driver.read(11, shown) != b"\x06":  # noqa: ASYNC110  it is asked for
+        await asyncio.sleep(0.01)
+    assert (await write(connection, PMC, HOME_OFFSET, 5)).read == 5
+
+
 async def test_units_are_those_of_the_device(connection: Connection) -> None:
     target = connection.target(PMM)
     result = await write_text(connection.driver(target), target, LIMIT, "48,5 °C", connection.journal)

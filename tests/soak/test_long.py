@@ -1,4 +1,4 @@
-"""The long figures, run by ``make soak``: hours at work (``HUBSIDE_SOAK_S``, in seconds) and hundreds of kills."""
+"""The long figures, run by ``make soak``: hours at work (``HUBSIDE_SOAK_S``, in seconds)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,6 @@ from app.service.connection import Connection
 from app.service.options import Options
 from app.service.poll import Poller
 from tests.e2e.conftest import Twins, twins
-from tests.recording.test_durability import test_a_kill_at_any_moment_costs_half_a_second_at_most as kill_twenty
 
 pytestmark = [pytest.mark.soak, pytest.mark.timeout(6 * 3600)]
 
@@ -55,8 +54,3 @@ async def test_hours_at_work_lose_nothing_and_do_not_grow(twins: Twins, tmp_path
         with open_recording(path) as recording:
             recorded += sum(1 for _ in recording.frames())
     assert recorded == frames
-
-
-@pytest.mark.parametrize("number", range(10))
-def test_two_hundred_kills(number: int, tmp_path: Path) -> None:
-    kill_twenty(tmp_path)

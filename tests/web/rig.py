@@ -23,6 +23,7 @@ from app.scene.hub import HubScene
 from app.service.bench import Bench
 from app.service.connection import Connection
 from app.service.options import Options
+from app.service.replay.replays import Replays
 from app.service.sites import Sites
 from app.store.store import Store
 from app.web.access import Access
@@ -94,6 +95,7 @@ class Server:
     feeder: Feeder
     client: httpx.AsyncClient
     stranger: httpx.AsyncClient
+    replays: Replays
 
     @property
     def origin(self) -> str:
@@ -135,7 +137,9 @@ async def running(
     port = port_of(listener)
     access = Access(bench.office.sessions, port)
     token = access.issue_token()
-    async with serve(create_app(bench, access, port, scene, "en", page), listener):
+    guard = create_app(bench, access, port, scene, "en", page)
+    replays: Replays = guard._app.state.replays  # type: ignore[attr-defined]
+    async with serve(guard, listener):
         base = f"http://127.0.0.1:{port}"
         async with (
             httpx.AsyncClient(base_url=base, trust_env=False) as client,
@@ -145,7 +149,7 @@ async def running(
                 answer = await client.get(launch_url(port, token))
                 assert answer.status_code == 303
             try:
-                yield Server(port, token, access, bench, connection, Feeder(connection), client, stranger)
+                yield Server(port, token, access, bench, connection, Feeder(connection), client, stranger, replays)
             finally:
                 await bench.office.close()
 
@@ -176,6 +180,10 @@ class Page:
     async def subscribe(self, *topics: str) -> None:
         """Ask for topics."""
         await self.socket.send(json.dumps({"type": "subscribe", "topics": topics}))
+
+    async def say(self, message: dict[str, Any]) -> None:
+        """Send any message."""
+        await self.socket.send(json.dumps(message))
 
     async def next(self) -> dict[str, Any]:
         """The next message."""

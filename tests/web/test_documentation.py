@@ -40,8 +40,11 @@ def test_every_route_says_what_it_does_and_which_problems_it_answers(name: str) 
 def test_every_body_has_an_example_that_its_route_accepts() -> None:
     seen = 0
     for route in iter_route_contexts(APP.routes):
+        if str(route.path) not in DOCUMENT["paths"]:  # what refuses all that writes to a replay
+            assert "{path:path}" in str(route.path)
+            continue
         for method in route.methods or ():
-            operation: dict[str, Any] = DOCUMENT["paths"][route.path][method.lower()]
+            operation: dict[str, Any] = DOCUMENT["paths"][str(route.path)][method.lower()]
             for field in route.dependant.body_params:
                 example = operation["requestBody"]["content"]["application/json"]["example"]
                 TypeAdapter[Any](field.field_info.annotation).validate_python(example)

@@ -54,14 +54,16 @@ async def server(control: Control, tmp_path: Path) -> AsyncIterator[Server]:
     token = access.issue_token()
     connection = make_connection()
     base = f"http://127.0.0.1:{port}"
+    guard = create_app(bench, access, port)
+    replays = guard._app.state.replays  # type: ignore[attr-defined]
     try:
         async with (
-            serve(create_app(bench, access, port), listener),
+            serve(guard, listener),
             httpx.AsyncClient(base_url=base, trust_env=False, timeout=30) as client,
             httpx.AsyncClient(base_url=base, trust_env=False, timeout=30) as stranger,
         ):
             await client.get(launch_url(port, token))
-            yield Server(port, token, access, bench, connection, Feeder(connection), client, stranger)
+            yield Server(port, token, access, bench, connection, Feeder(connection), client, stranger, replays)
     finally:
         bench.connection = None
         await bench.close()

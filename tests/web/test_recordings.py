@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import AsyncIterator
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -20,15 +19,14 @@ async def server(connection: Connection, tmp_path: Path) -> AsyncIterator[Server
     """Connected and recording into ``rec``; the data folder's recordings lead there, with a sample beside."""
     (tmp_path / "recordings").symlink_to(tmp_path / "rec")
     (tmp_path / "rec" / "sample.mcap").write_bytes(SAMPLE.read_bytes())
-    async with running(connection) as started:
-        started.bench.options = replace(started.bench.options, data=tmp_path)
+    async with running(connection, data=tmp_path) as started:
         yield started
 
 
 async def test_the_running_recording_and_a_finished_one_are_listed(server: Server) -> None:
     listed = (await server.client.get("/api/recordings")).json()
     assert listed["free_bytes"] > 0
-    states = {one["name"]: one["state"] for one in listed["files"]}
+    states = {one["name"]: one["state"] for one in listed["files"] if not one["sample"]}
     assert server.connection.recording is not None
     live = server.connection.recording.status().file
     assert live is not None

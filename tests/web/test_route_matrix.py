@@ -44,12 +44,29 @@ ROUTES: Final[dict[tuple[str, str], Role]] = {
     ("GET", "/api/live/changes-since-last-visit"): VIEWER,
     ("GET", "/api/favourites/{description_id}"): VIEWER,
     ("PUT", "/api/favourites/{description_id}"): VIEWER,
+    ("GET", "/api/desk/views"): VIEWER,
+    ("PUT", "/api/desk/views"): VIEWER,
     # the connection and its devices
     ("GET", "/api/turbines"): VIEWER,
     ("POST", "/api/live/connect"): TECHNICIAN,
     ("POST", "/api/live/disconnect"): TECHNICIAN,
     ("POST", "/api/live/consent"): TECHNICIAN,
     ("GET", "/api/live/turbine"): VIEWER,
+    # who moves the axes
+    ("GET", "/api/live/motion"): VIEWER,
+    ("POST", "/api/live/motion/lease"): TECHNICIAN,
+    ("POST", "/api/live/motion/lease/ask"): TECHNICIAN,
+    ("POST", "/api/live/motion/lease/withdraw"): TECHNICIAN,
+    ("POST", "/api/live/motion/lease/answer"): TECHNICIAN,
+    ("POST", "/api/live/motion/lease/give-back"): TECHNICIAN,
+    ("POST", "/api/live/motion/confirm"): TECHNICIAN,
+    ("GET", "/api/live/devices/{turbine}/{station}/{device}/motion/interlocks"): VIEWER,
+    ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/prepare"): TECHNICIAN,
+    ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/put-back"): TECHNICIAN,
+    ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/jog"): TECHNICIAN,
+    ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/move"): TECHNICIAN,
+    ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/home"): TECHNICIAN,
+    ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/reset"): TECHNICIAN,
     ("GET", "/api/live/descriptions/{description_id}"): VIEWER,
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/read"): TECHNICIAN,
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/write"): TECHNICIAN,
@@ -68,6 +85,48 @@ ROUTES: Final[dict[tuple[str, str], Role]] = {
     ("GET", "/api/live/bus/transfers"): VIEWER,
     ("GET", "/api/live/bus/emergencies"): VIEWER,
     ("GET", "/api/live/bus/load"): VIEWER,
+    # why it tripped
+    ("GET", "/api/recordings/{name}/trips"): VIEWER,
+    ("GET", "/api/recordings/{name}/key-events"): VIEWER,
+    ("POST", "/api/search"): VIEWER,
+    ("POST", "/api/search/signature"): VIEWER,
+    ("GET", "/api/search/{job_id}"): VIEWER,
+    ("DELETE", "/api/search/{job_id}"): VIEWER,
+    ("POST", "/api/align"): VIEWER,
+    # to and from other formats
+    ("GET", "/api/recordings/{name}/losses"): VIEWER,
+    ("GET", "/api/recordings/{name}/export"): VIEWER,
+    ("GET", "/api/recordings/{name}/table"): VIEWER,
+    ("POST", "/api/recordings/import"): TECHNICIAN,
+    ("POST", "/api/recordings/merge"): TECHNICIAN,
+    ("POST", "/api/recordings/{name}/cut"): TECHNICIAN,
+    ("POST", "/api/recordings/{name}/anonymise"): TECHNICIAN,
+    ("GET", "/api/recordings/made/{job_id}"): VIEWER,
+    ("DELETE", "/api/recordings/made/{job_id}"): TECHNICIAN,
+    # replay
+    ("GET", "/api/replay"): VIEWER,
+    ("POST", "/api/replay"): VIEWER,
+    ("GET", "/api/replay/{replay_id}"): VIEWER,
+    ("DELETE", "/api/replay/{replay_id}"): TECHNICIAN,
+    ("POST", "/api/replay/{replay_id}/cursor"): VIEWER,
+    ("POST", "/api/replay/{replay_id}/{path:path}"): VIEWER,
+    ("PUT", "/api/replay/{replay_id}/{path:path}"): VIEWER,
+    ("PATCH", "/api/replay/{replay_id}/{path:path}"): VIEWER,
+    ("DELETE", "/api/replay/{replay_id}/{path:path}"): VIEWER,
+    ("POST", "/api/replay/{replay_id}/sets"): TECHNICIAN,
+    ("GET", "/api/replay/{replay_id}/timeline"): VIEWER,
+    ("GET", "/api/replay/{replay_id}/events"): VIEWER,
+    ("GET", "/api/replay/{replay_id}/signals"): VIEWER,
+    ("GET", "/api/replay/{replay_id}/series"): VIEWER,
+    ("GET", "/api/replay/{replay_id}/history"): VIEWER,
+    ("GET", "/api/replay/{replay_id}/turbine"): VIEWER,
+    ("GET", "/api/replay/{replay_id}/descriptions/{description_id}"): VIEWER,
+    ("GET", "/api/replay/{replay_id}/frames"): VIEWER,
+    ("GET", "/api/replay/{replay_id}/bus/nodes"): VIEWER,
+    ("GET", "/api/replay/{replay_id}/bus/identifiers"): VIEWER,
+    ("GET", "/api/replay/{replay_id}/bus/transfers"): VIEWER,
+    ("GET", "/api/replay/{replay_id}/bus/emergencies"): VIEWER,
+    ("GET", "/api/replay/{replay_id}/bus/load"): VIEWER,
     # recordings and sets
     ("GET", "/api/recordings"): VIEWER,
     ("GET", "/api/recordings/{name}"): VIEWER,
@@ -89,6 +148,20 @@ ROUTES: Final[dict[tuple[str, str], Role]] = {
     ("POST", "/api/fleet"): VIEWER,
     ("GET", "/api/rules"): VIEWER,
     ("POST", "/api/rules/check"): VIEWER,
+    # incidents
+    ("GET", "/api/incidents"): VIEWER,
+    ("POST", "/api/incidents"): TECHNICIAN,
+    ("GET", "/api/incidents/{key}"): VIEWER,
+    ("PUT", "/api/incidents/{key}"): TECHNICIAN,
+    ("DELETE", "/api/incidents/{key}"): EXPERT,
+    ("GET", "/api/incidents/{key}/versions"): VIEWER,
+    ("GET", "/api/incidents/{key}/bundle"): VIEWER,
+    ("GET", "/api/incidents/{key}/report"): VIEWER,
+    ("POST", "/api/incidents/import"): TECHNICIAN,
+    ("GET", "/api/recordings/{name}/annotations"): VIEWER,
+    ("POST", "/api/recordings/{name}/annotations"): TECHNICIAN,
+    ("PUT", "/api/annotations/{annotation_id}"): TECHNICIAN,
+    ("DELETE", "/api/annotations/{annotation_id}"): TECHNICIAN,
     # motors
     ("GET", "/api/motors"): VIEWER,
     ("GET", "/api/motors/form"): VIEWER,
@@ -138,19 +211,32 @@ ROUTES: Final[dict[tuple[str, str], Role]] = {
     (SOCKET, "/api/ws"): VIEWER,
     (SOCKET, "/viser"): VIEWER,
     (SOCKET, "/viser/"): VIEWER,
+    (SOCKET, "/viser/replay/{replay_id}"): VIEWER,
+    (SOCKET, "/viser/replay/{replay_id}/"): VIEWER,
+    ("GET", "/viser/replay/{replay_id}"): VIEWER,
+    ("GET", "/viser/replay/{replay_id}/{path:path}"): VIEWER,
     ("GET", "/viser"): VIEWER,
     ("GET", "/viser/{path:path}"): VIEWER,
+    ("GET", "/i/{code}"): VIEWER,
     ("GET", "/{path:path}"): VIEWER,
 }
 """The least role of every route."""
 
-WITHOUT_LOGIN: Final = {("GET", "/api/texts/{locale}"), ("POST", "/api/login"), ("GET", "/{path:path}")}
+WITHOUT_LOGIN: Final = {
+    ("GET", "/api/texts/{locale}"),
+    ("POST", "/api/login"),
+    ("GET", "/i/{code}"),
+    ("GET", "/{path:path}"),
+}
 """What a login page needs: open once there are users, and only then."""
 
 BODIES: Final[dict[tuple[str, str], dict[str, Any]]] = {
     ("POST", "/api/users"): {"name": "Zoe", "password": "never to be made", "role": "viewer"},
 }
 """Bodies of routes that look at the role only when they understood the request; all others are refused before."""
+
+BRINGS_BYTES: Final = {("POST", "/api/recordings/import"), ("POST", "/api/incidents/import")}
+"""To these a file is sent as it is."""
 
 PLACES: Final = {
     "{turbine}": "wtg-07",
@@ -167,7 +253,10 @@ PLACES: Final = {
     "{record_file}": "none.json",
     "{restore_id}": "0197a000-0000-7000-8000-000000000000",
     "{name}": "none.mcap",
+    "{replay_id}": "none",
     "{key}": "none",
+    "{annotation_id}": "none",
+    "{code}": "none",
 }
 
 PEOPLE: Final = {
@@ -208,6 +297,9 @@ async def ask(client: httpx.AsyncClient, route: tuple[str, str], **headers: str)
     """Ask as our own page does, but for ``headers``."""
     body = BODIES.get(route, {}) if route[0] in ("POST", "PUT", "PATCH") else None
     named = {name.replace("_", "-"): text for name, text in headers.items()}
+    if route in BRINGS_BYTES:
+        named.setdefault("Content-Type", "application/octet-stream")
+        return await client.request(route[0], path_of(route), content=b"", headers=named)
     return await client.request(route[0], path_of(route), json=body, headers=named)
 
 

@@ -25,8 +25,7 @@ SLUGS = {f"wtg-07/blade-{n}/{kind}" for n in (1, 2, 3) for kind in ("pmm", "pmc"
 
 @pytest.fixture
 async def server(connection: Connection, tmp_path: Path) -> AsyncIterator[Server]:
-    async with running(connection) as started:
-        started.bench.options = replace(started.bench.options, data=tmp_path)
+    async with running(connection, data=tmp_path) as started:
         yield started
 
 

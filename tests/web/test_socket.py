@@ -16,7 +16,8 @@ import websockets
 from app.model.address import Address
 from app.model.datatypes import DataType, encode_raw
 from app.service.journal import Kind
-from app.web.socket import HEARTBEAT_S, Feed
+from app.service.shown import LiveShown
+from app.web.feed import HEARTBEAT_S, Feed
 from app.wire import sdo
 from app.wire.frame import Can, Direction, Frame
 from app.wire.twin_environment import CAN_ID, TwinEnvironment, pack_environment
@@ -311,12 +312,12 @@ async def test_past_events_are_told_however_fast_a_page_asks_again() -> None:
     """Topics replaced before anything of them was told, and topics asked for while messages are on their way."""
     async with running() as server:
         server.bench.journal.note(Kind.CONNECTED, None, bus="can0", adapter="x")
-        hasty = Feed(server.bench)
+        hasty = Feed(LiveShown(server.bench))
         hasty.subscribe(["link", "events"])
         hasty.subscribe(["link", "events", "axes"])
         assert [m.data.text_key for m in hasty.due(0.0) if m.type == "event"] == ["journal.connected"]
 
-        midway = Feed(server.bench)
+        midway = Feed(LiveShown(server.bench))
         midway.subscribe(["link", "nodes", "axes"])
         messages = midway.due(0.0)
         next(messages)

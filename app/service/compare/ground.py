@@ -15,6 +15,7 @@ from app.service.bench import Bench
 from app.service.devices import Target
 from app.service.library.library import Library
 from app.service.office.visits import Visits
+from app.service.replay.moments import Moments
 from app.service.sites import Sites
 
 
@@ -33,6 +34,7 @@ class Ground:
     read: Mapping[str, ParameterSet] = field(default_factory=dict)
     known: tuple[Description, ...] = ()
     files: bool = False
+    moments: Moments | None = None
 
     def target(self, slug: str) -> Target | None:
         """A connected device."""
@@ -87,4 +89,5 @@ def ground_of(bench: Bench) -> Ground:
         sites=bench.sites,
         library=bench.office.library,
         visits=bench.office.visits,
+        moments=bench.moments,
     )

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Final
 
 from app.drivers.contract import TWIN_NAME
-from app.errors import SetUnknownError
+from app.errors import MomentError, RecordingError, SetUnknownError
 from app.model.address import Address, parse_address
 from app.model.datatypes import Raw
 from app.model.diff.column import Column
@@ -18,7 +18,7 @@ from app.model.set_record import SetRecord, Tag
 from app.model.sets import Origin, ParameterSet, iso_time
 from app.service.compare.ground import Ground
 from app.service.compare.known import Known, defaults_of, ram_of, stored_of
-from app.service.compare.spec import ColumnKind, ColumnSpec, Unresolved, parse_spec
+from app.service.compare.spec import ColumnKind, ColumnSpec, Unresolved, parse_moment, parse_spec
 from app.service.devices import Target
 from app.service.library.library import Library
 from app.service.library.recovered import Seen
@@ -94,6 +94,8 @@ class Columns:
                 return await self._kept(spec)
             case ColumnKind.YEAR:
                 return await self._year(spec)
+            case ColumnKind.MOMENT:
+                return await self._moment(spec)
             case ColumnKind.LATEST:
                 return await self._latest(spec)
             case ColumnKind.GOLDEN | ColumnKind.DELIVERED | ColumnKind.FOUND | ColumnKind.LEFT:
@@ -164,6 +166,17 @@ class Columns:
         )
         twin = _is_twin(parameters.identity.device_name)
         return Shown(spec, column, origin.t_ns, origin.person, origin.reason, parameters.hash, record, twin)
+
+    async def _moment(self, spec: ColumnSpec) -> Shown:
+        recording, t_ns, device = parse_moment(spec)
+        if self.ground.moments is None:
+            raise Unresolved.NOT_HERE.error(str(spec))
+        try:
+            moment = await self.ground.moments.at(recording, t_ns)
+            shown = self.of_set(spec, moment.parameters(device, "", recording))
+        except (MomentError, RecordingError) as error:
+            raise Unresolved.NO_MOMENT.error(str(spec)) from error
+        return replace(shown, hash=None, t_ns=moment.t_ns, recording=recording)
 
     def _file(self, spec: ColumnSpec) -> Shown:
         """A file of this computer. Raises ColumnError, SetFileError, OSError."""

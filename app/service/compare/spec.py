@@ -15,6 +15,7 @@ class ColumnKind(Enum):
     written yet. ``DEFAULT``: of the description. ``SET``: a record of the library. ``FILE``: a set file. ``GOLDEN``:
     the model set of the device's kind. ``DELIVERED``: as delivered. ``FOUND``, ``LEFT``: of the last visit that kept
     values. ``YEAR``: about a year ago. ``LATEST``: the newest set that is kept, a complete one where there is one.
+    ``MOMENT``: what a recording had shown until a time, as ``moment:<recording>@<t_ns>/<device>``.
     """
 
     LIVE = "live"
@@ -29,11 +30,12 @@ class ColumnKind(Enum):
     LEFT = "left"
     YEAR = "year"
     LATEST = "latest"
+    MOMENT = "moment"
 
     @property
     def of_device(self) -> bool:
         """True where the column is named by a device."""
-        return self not in (ColumnKind.SET, ColumnKind.FILE)
+        return self not in (ColumnKind.SET, ColumnKind.FILE, ColumnKind.MOMENT)
 
 
 class Unresolved(Enum):
@@ -52,6 +54,7 @@ class Unresolved(Enum):
     NO_OBJECT = "no-object"
     NOT_HERE = "not-here"
     NO_EDITOR = "no-editor"
+    NO_MOMENT = "no-moment"
 
     def error(self, column: str, **details: str) -> ColumnError:
         """The error that says so of ``column``."""
@@ -60,13 +63,25 @@ class Unresolved(Enum):
 
 @dataclass(frozen=True, slots=True)
 class ColumnSpec:
-    """``of`` is a device (turbine/station/device), a record's id or the beginning of a set's hash, or a path."""
+    """``of`` is a device (turbine/station/device), a record's id or the beginning of a set's hash, or a path.
+
+    Of a moment it is ``<recording>@<t_ns>/<device>``.
+    """
 
     kind: ColumnKind
     of: str
 
     def __str__(self) -> str:
         return f"{self.kind.value}:{self.of}"
+
+
+def parse_moment(spec: ColumnSpec) -> tuple[str, int, str]:
+    """Recording, time in ns and device of a moment. Raises ColumnError."""
+    place, _, device = spec.of.partition("/")
+    recording, _, digits = place.rpartition("@")
+    if not recording or not device or not (digits.isascii() and digits.isdecimal() and len(digits) <= 19):
+        raise Unresolved.NO_MOMENT.error(str(spec))
+    return recording, int(digits), device
 
 
 def parse_spec(text: str) -> ColumnSpec:

@@ -22,6 +22,7 @@ from app.model.datatypes import Raw
 from app.model.description import Description
 from app.model.sets import Origin, ParameterSet, identity_of, iso_time
 from app.recording.content import Event, EventKind, RecordingInfo
+from app.recording.node_table import read_nodes
 from app.service.devices import decode
 from app.service.library.series import Progress, Series
 from app.wire.decoder import CanOpenDecoder
@@ -166,11 +167,9 @@ def _nodes_of(
 ) -> dict[tuple[str, int], Named]:
     """What the files say of their nodes (``can0/11`` = slug and description), where the description is known."""
     found = {}
-    for key, text in (pair for info in infos for pair in info.nodes.items()):
-        bus, _, number = key.rpartition("/")
-        slug, _, description = text.rpartition(" ")
-        if number.isdecimal() and description in described and int(number) not in named:
-            found[bus, int(number)] = Named(slug, described[description])
+    for (bus, node), name in (pair for info in infos for pair in read_nodes(info.nodes).items()):
+        if name.description_id in described and node not in named:
+            found[bus, node] = Named(name.slug, described[name.description_id])
     return found
 
 

@@ -63,6 +63,15 @@ class Action(Enum):
     MOTOR_CHANGED = "motor_changed"
     MOTOR_DELETED = "motor_deleted"
     MOTOR_ASSIGNED = "motor_assigned"
+    INCIDENT_CHANGED = "incident_changed"
+    INCIDENT_HIDDEN = "incident_hidden"
+    INCIDENT_EXPORTED = "incident_exported"
+    INCIDENT_OPENED = "incident_opened"
+    INCIDENT_REPORTED = "incident_reported"
+    ANNOTATED = "annotated"
+    ANNOTATION_CHANGED = "annotation_changed"
+    ANNOTATION_REMOVED = "annotation_removed"
+    ANNOTATIONS_MERGED = "annotations_merged"
 
     @property
     def text_key(self) -> str:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from app.service.incidents.annotations import Annotations
+from app.service.incidents.incidents import Incidents
 from app.service.journal import Journal
 from app.service.library.library import Library
 from app.service.motors import Motors
@@ -15,7 +17,7 @@ from app.store.store import Store
 
 
 class Office:
-    """Audit log, users, sessions, visits and motors of ``store``. ``stamp`` gives t_ns.
+    """Audit log, users, sessions, visits, motors and incidents of ``store``. ``stamp`` gives t_ns.
 
     Every event of ``journal`` is audited. ``person`` is who a launch token lets in. Raises StoreError. Belongs to the
     event loop, and owns the store.
@@ -29,6 +31,8 @@ class Office:
         self.library = Library(store, self.audit, stamp)
         self.visits = Visits(store, self.audit, stamp, self.library)
         self.motors = Motors(store, self.audit, stamp)
+        self.incidents = Incidents(store, self.audit, stamp, journal)
+        self.annotations = Annotations(store, self.audit, stamp)
         self._stop_listening = journal.listen(self.audit.take)
 
     async def close(self) -> None:

@@ -10,6 +10,7 @@ from typing import Final
 from app.drivers.contract import Driver
 from app.errors import HubsideError, NoAnswerError, UsageError
 from app.model.address import Address
+from app.model.axis_state import ENERGISED, FOLLOWING, AxisState
 from app.model.datatypes import Raw
 from app.model.restore.wanted import DeviceState
 from app.model.sets import ParameterSet
@@ -21,9 +22,6 @@ from app.service.devices import Target
 STATUSWORD: Final = Address(0x6041)
 MODE_SHOWN: Final = Address(0x6061)
 VELOCITY: Final = Address(0x606C)
-_STAGE_ON: Final = (0x23, 0x27, 0x07)
-"""Switched on, operation enabled, quick stop active (manual table 49): the output stage is on."""
-_DRIVEN: Final = (0x27, 0x07)
 STANDSTILL: Final = 10
 """Velocity in position units a second up to which an axis stands: 0.1 degrees a second as delivered."""
 PIECE: Final = 16
@@ -109,12 +107,12 @@ def state_of(report: ReadReport) -> DeviceState:
 
 def stage_on(status: int) -> bool:
     """True where a statusword says that the output stage is on."""
-    return status & 0x6F in _STAGE_ON or status & 0x4F == 0x0F
+    return AxisState.of(status) in ENERGISED
 
 
 def is_driven(status: int) -> bool:
     """True where a statusword says that the axis follows something: set-points, a quick stop, a fault reaction."""
-    return status & 0x6F in _DRIVEN or status & 0x4F == 0x0F
+    return AxisState.of(status) in FOLLOWING
 
 
 def boots_of(target: Target) -> int:

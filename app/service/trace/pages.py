@@ -1,14 +1,15 @@
 """Pages of the trace: rows before, after or around a moment, from what is kept in memory, else from the recording.
 
 Blocking: to be called in a thread of its own. Both sources are decoded the same way, from a known state of the decoder
-before the first frame; the answer says where its rows come from and how far was looked.
+before the first frame; the answer says where its rows come from and how far was looked. Nothing later than the stage's
+now is told: a recording that is replayed holds frames that have not happened yet at its cursor.
 """
 
 from __future__ import annotations
 
 import heapq
 from collections import deque
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
@@ -16,7 +17,7 @@ from typing import Any, Final, Literal
 
 from app.recording.content import Keyframe
 from app.recording.reader import Recording, open_recording
-from app.service.connection import Connection
+from app.service.stage import Stage
 from app.service.trace.log import BusTrace
 from app.service.trace.query import TraceQuery, filter_of
 from app.service.trace.text import Namer, TraceLine, line
@@ -64,14 +65,14 @@ class _Found:
 
 
 class TracePages:
-    """Reads pages of the trace of ``connection`` for one query. Raises UsageError where the query makes no sense."""
+    """Reads pages of the trace of ``stage`` for one query. Raises UsageError where the query makes no sense."""
 
-    def __init__(self, connection: Connection, query: TraceQuery) -> None:
-        targets = list(connection.targets)
-        self._connection = connection
+    def __init__(self, stage: Stage, query: TraceQuery) -> None:
+        targets = list(stage.targets)
+        self._stage = stage
         self._namer = Namer(targets)
         self._filter = filter_of(query, targets, self._namer)
-        self._traces = [link.trace for link in connection.buses.values()]
+        self._traces = [link.trace for link in stage.buses.values()]
 
     def page(self, side: Side, t_ns: int, limit: int) -> TracePage:
         """Up to ``limit`` rows. Raises RecordingError where the recording is needed and cannot be read."""
@@ -101,12 +102,12 @@ class TracePages:
         if t_ns <= kept_from_ns:
             return self._recorded_before(t_ns, limit)
         found = _merged([_ring_before(trace, self._filter, t_ns, limit) for trace in self._traces], limit, newest=True)
-        recorded = self._connection.recording is not None
+        recorded = bool(self._parts())
         return self._page(found, "ring", older=found.more or recorded, newer=True, edge=(found.reached_ns, t_ns))
 
     def _after(self, t_ns: int, limit: int) -> TracePage:
         starts = [chunks[0].start_ns for trace in self._traces if (chunks := trace.chunks())]
-        if self._connection.recording is not None and starts and t_ns < min(starts) - 1:
+        if starts and t_ns < min(starts) - 1 and self._parts():
             return self._recorded_after(t_ns, limit)
         found = _merged([_ring_after(trace, self._filter, t_ns, limit) for trace in self._traces], limit, newest=False)
         return self._page(found, "ring", older=True, newer=found.more, edge=(t_ns, found.reached_ns))
@@ -120,6 +121,7 @@ class TracePages:
     # -- the recording ----------------------------------------------------------------
 
     def _recorded_before(self, t_ns: int, limit: int) -> TracePage:
+        t_ns = min(t_ns, self._stage.stamper() + 1)
         for path in reversed(self._parts()):
             with open_recording(path) as recording:
                 span = recording.span_ns
@@ -152,12 +154,13 @@ class TracePages:
         return list(rows), scanned
 
     def _recorded_after(self, t_ns: int, limit: int) -> TracePage:
+        now_ns = self._stage.stamper()
         for path in self._parts():
             with open_recording(path) as recording:
                 span = recording.span_ns
-                if span is None or span[1] <= t_ns:
+                if span is None or min(span[1], now_ns) <= t_ns:
                     continue
-                found = self._look_on(recording, t_ns + 1, span[1], limit)
+                found = self._look_on(recording, t_ns + 1, min(span[1], now_ns), limit)
                 return self._page(found, "recording", True, True, (t_ns, found.reached_ns))
         found = _merged([_ring_after(trace, self._filter, t_ns, limit) for trace in self._traces], limit, newest=False)
         return self._page(found, "ring", older=True, newer=found.more, edge=(t_ns, found.reached_ns))
@@ -184,14 +187,9 @@ class TracePages:
             if frame.t_ns >= from_ns:
                 yield row
 
-    def _parts(self) -> list[Path]:
+    def _parts(self) -> Sequence[Path]:
         """The files of this recording, oldest first."""
-        recording = self._connection.recording
-        file = None if recording is None else recording.status().file
-        if file is None:
-            return []
-        series = file.name.rsplit("-", 1)[0]
-        return sorted(file.parent.glob(f"{series}-[0-9][0-9][0-9].mcap"))
+        return self._stage.recorded_files()
 
     def _passes(self, row: TraceRow) -> bool:
         return self._filter.passes_item(row.item, row.speaker) and self._filter.passes_row(row)

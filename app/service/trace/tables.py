@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any, Final, Literal
 
 from app.model.address import Address
-from app.service.bus_link import BusLink
-from app.service.connection import Connection
+from app.service.bus_feed import BusFeed
+from app.service.stage import Stage
 from app.service.trace.text import Namer, TraceItem, abort_details, emcy_details
 from app.wire.busload import EXTENDED_KEY
 from app.wire.emcy import NO_ERROR
@@ -126,26 +126,26 @@ class BusLoadLine:
     seconds: tuple[LoadSecondLine, ...]
 
 
-def nodes(connection: Connection) -> list[BusNode]:
+def nodes(stage: Stage) -> list[BusNode]:
     """All nodes of all buses, by number."""
-    now_ns = connection.stamper()
-    namer = Namer(connection.targets)
-    views = {(view.bus, view.node): view for view in connection.live.nodes()}
-    places = {(target.device.bus, target.node) for target in connection.targets} | set(views)
+    now_ns = stage.stamper()
+    namer = Namer(stage.targets)
+    views = {(view.bus, view.node): view for view in stage.live.nodes()}
+    places = {(target.device.bus, target.node) for target in stage.targets} | set(views)
     found = []
-    for bus, link in connection.buses.items():
+    for bus, link in stage.buses.items():
         loads, last = link.node_load(now_ns), link.trace.last_transfers()
         of_bus = {node for each, node in places if each == bus}
         of_bus |= {node for node in loads if 0 < node <= MAX_NODE}
         for node in sorted(of_bus):
             view = views.get((bus, node))
-            found.append(_node(connection, link, namer, node, view, loads.get(node, 0.0), last.get(node)))
+            found.append(_node(stage, link, namer, node, view, loads.get(node, 0.0), last.get(node)))
     return found
 
 
 def _node(
-    connection: Connection,
-    link: BusLink,
+    stage: Stage,
+    link: BusFeed,
     namer: Namer,
     node: int,
     view: NodeView | None,
@@ -163,7 +163,7 @@ def _node(
         node=node,
         device=namer.slug(bus, node),
         description=None if target is None else target.description.id,
-        device_name=_device_name(connection, bus, node),
+        device_name=_device_name(stage, bus, node),
         seen=view is not None,
         nmt=None if known.state is None or known.silent else known.state.text_key,
         commanded=known.commanded,
@@ -180,17 +180,17 @@ def _node(
     )
 
 
-def _device_name(connection: Connection, bus: str, node: int) -> str | None:
-    view = connection.live.value(bus, node, DEVICE_NAME)
+def _device_name(stage: Stage, bus: str, node: int) -> str | None:
+    view = stage.live.value(bus, node, DEVICE_NAME)
     return None if view is None or view.reading is None else view.reading.data.rstrip(b"\0").decode("ascii", "replace")
 
 
-def identifiers(connection: Connection) -> list[BusIdentifier]:
+def identifiers(stage: Stage) -> list[BusIdentifier]:
     """All identifiers of all buses since the connection was opened."""
-    now_ns = connection.stamper()
-    namer = Namer(connection.targets)
+    now_ns = stage.stamper()
+    namer = Namer(stage.targets)
     found = []
-    for bus, link in connection.buses.items():
+    for bus, link in stage.buses.items():
         shares = link.identifier_load(now_ns)
         for view in link.trace.identifiers(now_ns):
             can = view.frame.payload
@@ -226,10 +226,10 @@ def _ms(ns: int | None) -> float | None:
     return None if ns is None else round(ns / 1e6, 3)
 
 
-def transfers(connection: Connection, which: Transfers, node: int | None, limit: int) -> list[SdoLine]:
+def transfers(stage: Stage, which: Transfers, node: int | None, limit: int) -> list[SdoLine]:
     """The latest ``limit`` transfers, newest first."""
-    namer = Namer(connection.targets)
-    seen = [one for link in connection.buses.values() for one in link.trace.transfers(polls=which == "all")]
+    namer = Namer(stage.targets)
+    seen = [one for link in stage.buses.values() for one in link.trace.transfers(polls=which == "all")]
     wanted = [
         one
         for one in seen
@@ -257,10 +257,10 @@ def _transfer(seen: SdoSeen, namer: Namer) -> SdoLine:
     )
 
 
-def emergencies(connection: Connection, limit: int) -> list[EmcyLine]:
+def emergencies(stage: Stage, limit: int) -> list[EmcyLine]:
     """The latest ``limit`` emergency messages, newest first."""
-    namer = Namer(connection.targets)
-    seen = [one for link in connection.buses.values() for one in link.trace.emergencies()]
+    namer = Namer(stage.targets)
+    seen = [one for link in stage.buses.values() for one in link.trace.emergencies()]
     seen.sort(key=lambda one: -one.t_ns)
     return [
         EmcyLine(
@@ -275,11 +275,11 @@ def emergencies(connection: Connection, limit: int) -> list[EmcyLine]:
     ]
 
 
-def load(connection: Connection) -> list[BusLoadLine]:
+def load(stage: Stage) -> list[BusLoadLine]:
     """The load of every bus, with the last minutes."""
-    now_ns = connection.stamper()
+    now_ns = stage.stamper()
     found = []
-    for bus, link in connection.buses.items():
+    for bus, link in stage.buses.items():
         seconds, by_node = link.load_history(HISTORY_S)
         shares = dict(by_node)
         lines = tuple(

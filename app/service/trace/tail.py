@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from app.errors import UsageError
-from app.service.connection import Connection
+from app.service.stage import Stage
 from app.service.trace.log import BusTrace
 from app.service.trace.query import TraceQuery, filter_of
 from app.service.trace.text import Namer, TraceLine, line
@@ -69,10 +69,10 @@ class _BusTail:
 
 
 class TraceTail:
-    """The tail of all buses of ``connection`` from now on. For one thread."""
+    """The tail of all buses of ``stage`` from now on. For one thread."""
 
-    def __init__(self, connection: Connection, query: TraceQuery) -> None:
-        targets = list(connection.targets)
+    def __init__(self, stage: Stage, query: TraceQuery) -> None:
+        targets = list(stage.targets)
         self._query = query
         self._namer = Namer(targets)
         self._filter: TraceFilter | None = None
@@ -81,8 +81,8 @@ class TraceTail:
             self._filter = filter_of(query, targets, self._namer)
         except UsageError as error:
             self._invalid = str(error.details["reason"])
-        self._tails = [_BusTail(link.trace) for link in connection.buses.values()]
-        self._start_ns = connection.stamper()
+        self._tails = [_BusTail(link.trace) for link in stage.buses.values()]
+        self._start_ns = stage.stamper()
         self._waiting: deque[TraceRow] = deque()
         self._seen = self._matched = self._sent = self._left_out = 0
 

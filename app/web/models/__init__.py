@@ -8,7 +8,9 @@ from pydantic import BaseModel, ConfigDict, Field, StrictFloat, StrictInt, Stric
 
 from app.service.instructor import InstructorLine
 from app.service.link import LinkLine, Mode
+from app.service.motion.line import MotionLine
 from app.service.rotor_view import RotorLine
+from app.service.shown import CursorLine
 from app.service.trace.tail import TraceBatch
 from app.service.views import AxisLine, EventLine, NodeLine, RawJson, ValueCell
 from app.web.models.trace import TraceFilter
@@ -219,12 +221,15 @@ class ValuesData(BaseModel):
 
 
 class _Envelope(BaseModel):
-    """``seq`` counts the messages of one connection; ``t_ns`` is the bench's time when it was sent."""
+    """``ctx`` is ``live``, or ``replay/`` and the name of a recording; ``seq`` counts the messages of one context.
+
+    ``t_ns`` is the time that is shown: of the bench when it was sent, or of the recording at its cursor.
+    """
 
     model_config = ConfigDict(json_schema_serialization_defaults_required=True)
 
     v: Literal[1] = API_VERSION
-    ctx: Literal["live"] = "live"
+    ctx: str = "live"
     seq: int
     t_ns: int
 
@@ -301,6 +306,13 @@ class InstructorMessage(_Envelope):
     data: InstructorLine
 
 
+class MotionMessage(_Envelope):
+    """Topic ``motion``: who may move the axes, what is prepared and under way, where it changed."""
+
+    type: Literal["motion"] = "motion"
+    data: MotionLine
+
+
 class ValuesMessage(_Envelope):
     """Topic ``values:<slug>``: all that is known, then what changed."""
 
@@ -322,6 +334,20 @@ class TraceMessage(_Envelope):
     data: TraceBatch
 
 
+class CursorMessage(_Envelope):
+    """Topic ``cursor``: where a replay stands, where it moved, at most 50 times a second."""
+
+    type: Literal["cursor"] = "cursor"
+    data: CursorLine
+
+
+class GoneMessage(_Envelope):
+    """The replay ``ctx`` is not open, or no longer: open it again to hear of it."""
+
+    type: Literal["gone"] = "gone"
+    data: Nothing = Nothing()
+
+
 ServerMessage = Annotated[
     HelloMessage
     | BenchMessage
@@ -331,23 +357,46 @@ ServerMessage = Annotated[
     | AxesMessage
     | RotorMessage
     | InstructorMessage
+    | MotionMessage
     | ValuesMessage
     | EventMessage
-    | TraceMessage,
+    | TraceMessage
+    | CursorMessage
+    | GoneMessage,
     Field(discriminator="type"),
 ]
 """What the socket sends."""
 
 
 class Subscribe(BaseModel):
-    """What the page wants to hear; replaces what it wanted before. ``trace`` is the filter of the topic ``trace``."""
+    """What the page wants to hear of a context; replaces what it wanted before of it.
+
+    ``trace`` is the filter of the topic ``trace``.
+    """
 
     model_config = ConfigDict(extra="forbid")
 
     type: Literal["subscribe"]
+    ctx: Annotated[str, Field(max_length=300)] = "live"
     topics: Annotated[list[Annotated[str, Field(max_length=200)]], Field(max_length=200)]
     trace: TraceFilter | None = None
 
 
-ClientMessage = Subscribe
+class Beat(BaseModel):
+    """The dead man: a page that has the lease says that it is there, and whether its person holds what moves an axis.
+
+    ``fence`` is the number of the lease, ``number`` rises with each beat, ``order`` is that of what is held.
+    """
+
+    model_config = ConfigDict(extra="forbid")
+
+    type: Literal["beat"]
+    page: Annotated[str, Field(min_length=1, max_length=64)]
+    fence: int
+    number: int
+    holding: bool
+    order: int = 0
+
+
+ClientMessage = Annotated[Subscribe | Beat, Field(discriminator="type")]
 """What the socket takes."""

@@ -18,7 +18,19 @@ from app.web.models.writes import RawIn
 MAX_COLUMNS = 12
 
 ColumnKindName = Literal[
-    "live", "stored", "editor", "default", "set", "file", "golden", "delivered", "found", "left", "year", "latest"
+    "live",
+    "stored",
+    "editor",
+    "default",
+    "set",
+    "file",
+    "golden",
+    "delivered",
+    "found",
+    "left",
+    "year",
+    "latest",
+    "moment",
 ]
 RowStateName = Literal["same", "different", "unit", "missing", "not-comparable"]
 CellStateName = Literal["value", "not-in-set", "not-on-device", "unread", "empty"]

@@ -27,7 +27,10 @@ FileStateName = Literal["live", "finished", "unfinished", "unreadable", "unread"
 
 
 class RecordingRef(BaseModel):
-    """One file. ``unread``: it was not looked into yet, ask again; ``reason`` says why it cannot be read."""
+    """One file. ``unread``: it was not looked into yet, ask again; ``reason`` says why it cannot be read.
+
+    ``sample``: it came with the program.
+    """
 
     name: str
     size_bytes: int
@@ -35,6 +38,7 @@ class RecordingRef(BaseModel):
     state: FileStateName
     summary: RecordingSummary | None
     reason: str | None
+    sample: bool = False
 
 
 class RecordingList(BaseModel):

@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from app.model.site import HEARTBEAT_NODE
 from app.web.models import Failure
 
 Slug = Annotated[str, Field(max_length=60, pattern=r"^[a-z0-9]+(-[a-z0-9]+)*$")]
@@ -166,13 +167,17 @@ class SettingsJobDoc(BaseModel):
 
 
 class BusDoc(BaseModel):
-    """A bus of a turbine; ``bitrate`` 0: the connection names it."""
+    """A bus of a turbine; ``bitrate`` 0: the connection names it.
+
+    ``heartbeat_node``: as whom this tool beats on it while axes are moved.
+    """
 
     model_config = ConfigDict(extra="forbid")
 
     name: Slug
     connection: Short
     bitrate: Annotated[int, Field(ge=0, le=1_000_000)]
+    heartbeat_node: Annotated[int, Field(ge=1, le=127)] = HEARTBEAT_NODE
 
 
 class SiteDeviceDoc(BaseModel):

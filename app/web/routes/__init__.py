@@ -5,14 +5,22 @@ from __future__ import annotations
 from fastapi import APIRouter
 
 from app.web.deps import ANY_PROBLEM
+from app.web.in_replay import WRITES_ONLY_LIVE
 from app.web.routes import (
+    analysis,
     audit,
     compare,
+    desk,
     devices,
+    exchange,
+    incidents,
     instructor,
     jobs,
+    motion,
     motors,
     recordings,
+    replay,
+    replay_views,
     restore,
     rules,
     session,
@@ -32,8 +40,10 @@ FEATURES = (
     devices,
     jobs,
     stop,
+    motion,
     writes,
     recordings,
+    exchange,
     sets,
     compare,
     motors,
@@ -45,12 +55,18 @@ FEATURES = (
     settings,
     trace,
     instructor,
+    replay,
+    replay_views,
+    desk,
+    analysis,
+    incidents,
 )
 
 
 def api_router() -> APIRouter:
-    """All routes under ``/api``."""
-    router = APIRouter(prefix="/api", responses=ANY_PROBLEM)
+    """All routes under ``/api``; from a page that shows a replay only those that say so."""
+    router = APIRouter(prefix="/api", responses=ANY_PROBLEM, dependencies=[WRITES_ONLY_LIVE])
     for feature in FEATURES:
         router.include_router(feature.router)
+    router.include_router(replay.refusals)
     return router

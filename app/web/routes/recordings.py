@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any, Final
 
-from fastapi import APIRouter, Depends, Request, Response
+from fastapi import APIRouter, Depends, Response
 from fastapi.responses import FileResponse, StreamingResponse
 
 from app.service import recording_list
@@ -32,16 +32,11 @@ PIECE: Final = 1 << 20
 router = APIRouter()
 
 
-def get_recordings(request: Request, bench: BenchOf) -> Recordings:
-    """The recordings of this server's data folder. Raises NotFoundError where it has none."""
-    folder = bench.options.data
-    if folder is None:
+def get_recordings(bench: BenchOf) -> Recordings:
+    """The recordings that this server knows. Raises NotFoundError where it has no data folder."""
+    if bench.recordings is None:
         raise NotFoundError(what="recordings")
-    state = request.app.state
-    if not hasattr(state, "recordings"):
-        state.recordings = Recordings(folder / "recordings")
-    recordings: Recordings = state.recordings
-    return recordings
+    return bench.recordings
 
 
 RecordingsOf = Annotated[Recordings, Depends(get_recordings)]
@@ -50,7 +45,7 @@ RecordingsOf = Annotated[Recordings, Depends(get_recordings)]
 @router.get("/recordings")
 async def recordings(bench: BenchOf, all_of_them: RecordingsOf) -> RecordingList:
     """The recordings, latest first. Those of state ``unread`` are filled in by the next requests."""
-    files = await asyncio.to_thread(all_of_them.files, _live_file(bench))
+    files = await asyncio.to_thread(all_of_them.files, live_file(bench))
     return RecordingList(
         folder=str(all_of_them.folder), free_bytes=all_of_them.free_bytes, files=[_ref(one) for one in files]
     )
@@ -60,7 +55,7 @@ async def recordings(bench: BenchOf, all_of_them: RecordingsOf) -> RecordingList
 async def recording(bench: BenchOf, all_of_them: RecordingsOf, name: str) -> RecordingDoc:
     """What one recording holds beside its frames; of the one that is being written only where it lies."""
     path = _known(all_of_them, name)
-    if _is_live(bench, path):
+    if is_live(bench, path):
         return RecordingDoc(
             name=name, path=str(path), state="live", summary=None,
             metadata={}, topics={}, attachments=[], damages=[], losses=[],
@@ -86,7 +81,7 @@ async def recording(bench: BenchOf, all_of_them: RecordingsOf, name: str) -> Rec
 async def download_recording(bench: BenchOf, all_of_them: RecordingsOf, name: str) -> Response:
     """The file; of the one that is being written what it holds now."""
     path = _known(all_of_them, name)
-    if not _is_live(bench, path):
+    if not is_live(bench, path):
         return FileResponse(path, media_type=MCAP, headers=as_attachment(path.name))
     size = path.stat().st_size
     headers = {**as_attachment(path.name), "Content-Length": str(size)}
@@ -110,15 +105,16 @@ def _known(all_of_them: Recordings, name: str) -> Path:
     return path
 
 
-def _live_file(bench: Bench) -> Path | None:
+def live_file(bench: Bench) -> Path | None:
     """The file that is being written now."""
     connection = bench.connection
     recording = None if connection is None else connection.recording
     return None if recording is None else recording.status().file
 
 
-def _is_live(bench: Bench, path: Path) -> bool:
-    live = _live_file(bench)
+def is_live(bench: Bench, path: Path) -> bool:
+    """Whether the file is being written now."""
+    live = live_file(bench)
     return live is not None and live.name == path.name
 
 
@@ -138,6 +134,7 @@ def _ref(one: RecordingFile) -> RecordingRef:
         state="unread" if look is None else _state(look),
         summary=None if look is None else _summary(look.summary),
         reason=None if look is None else look.reason,
+        sample=one.sample,
     )
 
 

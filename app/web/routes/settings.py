@@ -257,7 +257,9 @@ def _turbine_doc(turbine: Turbine) -> SiteTurbineDoc:
         slug=turbine.slug,
         name=turbine.name,
         buses=[
-            BusDoc.model_construct(name=bus.name, connection=bus.connection, bitrate=bus.bitrate)
+            BusDoc.model_construct(
+                name=bus.name, connection=bus.connection, bitrate=bus.bitrate, heartbeat_node=bus.heartbeat_node
+            )
             for bus in turbine.buses
         ],
         stations=[
@@ -286,7 +288,7 @@ def _turbine(doc: SiteTurbineDoc) -> Turbine:
     _once("station", [station.slug for station in doc.stations])
     for station in doc.stations:
         _once(f"station.{station.slug}.device", [device.slug for device in station.devices])
-    buses = [BusConfig(bus.name, bus.connection, bus.bitrate) for bus in doc.buses]
+    buses = [BusConfig(bus.name, bus.connection, bus.bitrate, bus.heartbeat_node) for bus in doc.buses]
     stations = [
         (
             station.slug,

@@ -1,4 +1,4 @@
-"""The trace of the connected buses: pages of frames, and tables of nodes, identifiers, transfers, emergencies, load.
+"""The trace of the buses that are shown: pages of frames; tables of nodes, identifiers, transfers, emergencies, load.
 
 Reads only, for any session. The running trace comes by the socket's topic ``trace``.
 """
@@ -14,7 +14,7 @@ from app.errors import UsageError
 from app.service.trace import tables
 from app.service.trace.pages import Side, TracePage, TracePages
 from app.service.trace.tables import BusIdentifier, BusLoadLine, BusNode, EmcyLine, SdoLine, Transfers
-from app.web.deps import ConnectionOf
+from app.web.deps import StageOf, reads_both
 from app.web.models.trace import TraceFilter, Words, exact_ns
 
 router = APIRouter()
@@ -25,9 +25,8 @@ Moment = Annotated[int | None, Query(ge=0, le=2**62, description="A time stamp i
 Texts = Annotated[str, Query(max_length=200)]
 
 
-@router.get("/live/frames")
 async def frames(
-    connection: ConnectionOf,
+    stage: StageOf,
     before: Moment = None,
     after: Moment = None,
     around: Moment = None,
@@ -59,7 +58,7 @@ async def frames(
         from_t_ns=from_t_ns,
         to_t_ns=to_t_ns,
     )
-    pages = TracePages(connection, wanted.query())
+    pages = TracePages(stage, wanted.query())
     side, t_ns = asked[0]
     return await asyncio.to_thread(pages.page, side, exact_ns(t_ns), limit)
 
@@ -75,36 +74,39 @@ def _numbers(text: str) -> list[int]:
     return [int(name) for name in names]
 
 
-@router.get("/live/bus/nodes")
-async def bus_nodes(connection: ConnectionOf) -> list[BusNode]:
+async def bus_nodes(stage: StageOf) -> list[BusNode]:
     """All nodes that were seen on the buses, and those that the site names."""
-    return tables.nodes(connection)
+    return tables.nodes(stage)
 
 
-@router.get("/live/bus/identifiers")
-async def bus_identifiers(connection: ConnectionOf) -> list[BusIdentifier]:
+async def bus_identifiers(stage: StageOf) -> list[BusIdentifier]:
     """All CAN identifiers that were seen: latest data, count, rate, period, share of the load."""
-    return tables.identifiers(connection)
+    return tables.identifiers(stage)
 
 
-@router.get("/live/bus/transfers")
 async def bus_transfers(
-    connection: ConnectionOf,
+    stage: StageOf,
     which: Transfers = "writes",
     node: Annotated[int | None, Query(ge=1, le=127)] = None,
     limit: Limit = 500,
 ) -> list[SdoLine]:
     """SDO transfers, newest first: all, only writes and what did not succeed, or only what did not succeed."""
-    return tables.transfers(connection, which, node, limit)
+    return tables.transfers(stage, which, node, limit)
 
 
-@router.get("/live/bus/emergencies")
-async def bus_emergencies(connection: ConnectionOf, limit: Limit = 500) -> list[EmcyLine]:
+async def bus_emergencies(stage: StageOf, limit: Limit = 500) -> list[EmcyLine]:
     """Emergency messages, newest first."""
-    return tables.emergencies(connection, limit)
+    return tables.emergencies(stage, limit)
 
 
-@router.get("/live/bus/load")
-async def bus_load(connection: ConnectionOf) -> list[BusLoadLine]:
+async def bus_load(stage: StageOf) -> list[BusLoadLine]:
     """Load of each bus now and second by second, with the share of each node."""
-    return tables.load(connection)
+    return tables.load(stage)
+
+
+reads_both(router, "frames", frames)
+reads_both(router, "bus/nodes", bus_nodes)
+reads_both(router, "bus/identifiers", bus_identifiers)
+reads_both(router, "bus/transfers", bus_transfers)
+reads_both(router, "bus/emergencies", bus_emergencies)
+reads_both(router, "bus/load", bus_load)

@@ -9,9 +9,8 @@ from fastapi import APIRouter
 from app.model.od_export import description_dict
 from app.model.roles import Role
 from app.model.site import Turbine as SiteTurbine
-from app.service.bench import Bench
-from app.service.link import bench_line
-from app.web.deps import BenchOf, ConnectionOf, PersonOf, needs
+from app.service.shown import LiveShown, Shown
+from app.web.deps import BenchOf, PersonOf, ShownOf, StageOf, needs, reads_both
 from app.web.models import BusRef, ConnectRequest, DeviceRef, KnownTurbine, Nothing, StationRef, Turbine
 from app.web.problem import NotFoundError
 
@@ -36,7 +35,7 @@ async def connect(bench: BenchOf, person: PersonOf, request: ConnectRequest) -> 
     if request.turbine not in bench.sites.turbines:
         raise NotFoundError(what=request.turbine)
     await bench.connect(request.turbine, person.person)
-    return _turbine(bench, bench.require().turbine)
+    return _turbine(LiveShown(bench), bench.require().turbine)
 
 
 @router.post("/live/disconnect", dependencies=[needs(Role.TECHNICIAN)])
@@ -53,16 +52,14 @@ async def consent(bench: BenchOf, person: PersonOf, _request: Nothing) -> Nothin
     return Nothing()
 
 
-@router.get("/live/turbine")
-async def turbine(bench: BenchOf) -> Turbine | None:
-    """The connected turbine with its stations and devices; null where none is connected."""
-    return None if bench.connection is None else _turbine(bench, bench.connection.turbine)
+async def turbine(shown: ShownOf) -> Turbine | None:
+    """The turbine that is shown, with its stations and devices; null where none is connected."""
+    return None if shown.stage is None else _turbine(shown, shown.stage.turbine)
 
 
-def _turbine(bench: Bench, site: SiteTurbine) -> Turbine:
-    link = bench_line(bench)
-    connection = bench.require()
-    adapter = connection.buses[link.bus].adapter if link.bus else ""
+def _turbine(shown: Shown, site: SiteTurbine) -> Turbine:
+    link = shown.link()
+    adapter = next((bus.connection for bus in site.buses if bus.name == link.bus), "")
     stations = [
         StationRef(
             slug=station.slug,
@@ -79,10 +76,13 @@ def _turbine(bench: Bench, site: SiteTurbine) -> Turbine:
     return Turbine(slug=site.slug, name=site.name, mode=link.mode, bus=bus, stations=stations)
 
 
-@router.get("/live/descriptions/{description_id}")
-async def description(connection: ConnectionOf, description_id: str) -> dict[str, Any]:
+async def description(stage: StageOf, description_id: str) -> dict[str, Any]:
     """Everything that is known of a device's objects."""
-    found = next((one.description for one in connection.targets if one.description.id == description_id), None)
+    found = next((one.description for one in stage.targets if one.description.id == description_id), None)
     if found is None:
         raise NotFoundError(what=description_id)
     return description_dict(found)
+
+
+reads_both(router, "turbine", turbine)
+reads_both(router, "descriptions/{description_id}", description)

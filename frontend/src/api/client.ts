@@ -37,10 +37,19 @@ export function signedOut(): void {
   tellSignedOut();
 }
 
-async function answerOf(path: string, init: RequestInit): Promise<Response> {
+/** What the page shows, as its address says: the server lets no page write that shows a recording. */
+function contextHeader(): Record<string, string> {
+  const replay = new URLSearchParams(location.search).get("replay");
+  return replay === null ? {} : { "X-Hubside-Context": `replay/${encodeURIComponent(replay)}` };
+}
+
+type Init = RequestInit & { headers?: Record<string, string> };
+
+async function answerOf(path: string, init: Init): Promise<Response> {
   let response: Response;
+  const headers = Object.assign({}, init.headers, contextHeader());
   try {
-    response = await fetch(path, { credentials: "same-origin", ...init });
+    response = await fetch(path, { credentials: "same-origin", ...init, headers });
   } catch (cause) {
     throw new Unreachable(path, { cause });
   }
@@ -49,7 +58,7 @@ async function answerOf(path: string, init: RequestInit): Promise<Response> {
   return response;
 }
 
-async function request<T>(path: string, init: RequestInit): Promise<T> {
+async function request<T>(path: string, init: Init): Promise<T> {
   return (await (await answerOf(path, init)).json()) as T;
 }
 
@@ -89,6 +98,15 @@ export async function sendForFile(path: string, body: object, language: string):
   const headers = { "content-type": "application/json", "accept-language": language };
   const answer = await answerOf(path, { method: "POST", headers, body: JSON.stringify(body) });
   return answer.blob();
+}
+
+/** Sends a file as it is. */
+export function sendFile<T>(path: string, file: Blob): Promise<T> {
+  return request<T>(path, {
+    method: "POST",
+    headers: { "content-type": "application/octet-stream" },
+    body: file,
+  });
 }
 
 export function remove<T>(path: string): Promise<T> {

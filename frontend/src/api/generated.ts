@@ -4,6 +4,52 @@
  */
 
 export interface paths {
+    "/api/align": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Align Recordings
+         * @description Signals of several recordings on one axis, each by its own zero.
+         *
+         *     A recording that cannot be shown tells why; the others are shown all the same.
+         */
+        post: operations["align_recordings"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/annotations/{annotation_id}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        /**
+         * Change Annotation
+         * @description Change one; it stays on its recording and with its incident.
+         */
+        put: operations["change_annotation"];
+        post?: never;
+        /**
+         * Remove Annotation
+         * @description Take one off.
+         */
+        delete: operations["remove_annotation"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/audit": {
         parameters: {
             query?: never;
@@ -124,6 +170,30 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/desk/views": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Desk Views
+         * @description The views that this person has kept.
+         */
+        get: operations["desk_views"];
+        /**
+         * Put Desk Views
+         * @description Replace them; of two with the same name the last one stays.
+         */
+        put: operations["put_desk_views"];
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/favourites/{description_id}": {
         parameters: {
             query?: never;
@@ -162,6 +232,138 @@ export interface paths {
          * @description One golden set against the latest set of every device of its kind.
          */
         post: operations["fleet"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/incidents": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Incidents
+         * @description The newest version of every incident, the latest made first.
+         */
+        get: operations["incidents"];
+        put?: never;
+        /**
+         * Add Incident
+         * @description Keep a new incident. The hash of its whole recording is taken afterwards.
+         */
+        post: operations["add_incident"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/incidents/import": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Import Incident
+         * @description Open a bundle, the body of the request, and keep what of it is whole; ``name`` is that of its file.
+         */
+        post: operations["import_incident"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/incidents/{key}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Incident
+         * @description One incident by its id or code; an earlier version where one is named.
+         */
+        get: operations["incident"];
+        /**
+         * Change Incident
+         * @description Keep another version; it stays on its recording.
+         */
+        put: operations["change_incident"];
+        post?: never;
+        /**
+         * Hide Incident
+         * @description List it no more; its versions stay readable.
+         */
+        delete: operations["hide_incident"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/incidents/{key}/bundle": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Export Incident
+         * @description The incident as one file: recording cut, descriptions, sets, notes, annotations.
+         */
+        get: operations["export_incident"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/incidents/{key}/report": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Incident Report
+         * @description The incident as one HTML file to keep: it opens from a disk, with plots, values, words and the 3D scene.
+         */
+        get: operations["incident_report"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/incidents/{key}/versions": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Incident Versions
+         * @description All versions, newest first: who changed what, when.
+         */
+        get: operations["incident_versions"];
+        put?: never;
+        post?: never;
         delete?: never;
         options?: never;
         head?: never;
@@ -532,6 +734,146 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/live/devices/{turbine}/{station}/{device}/motion/home": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Home
+         * @description Take the present position of an axis without power for an angle (homing method 35).
+         */
+        post: operations["home"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/live/devices/{turbine}/{station}/{device}/motion/interlocks": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Interlocks
+         * @description How every interlock of an axis stands.
+         */
+        get: operations["interlocks"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/live/devices/{turbine}/{station}/{device}/motion/jog": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Jog
+         * @description Turn the blade as long as it is held.
+         */
+        post: operations["jog"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/live/devices/{turbine}/{station}/{device}/motion/move": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Move
+         * @description Move the blade to an angle as long as it is held.
+         */
+        post: operations["move"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/live/devices/{turbine}/{station}/{device}/motion/prepare": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Prepare
+         * @description Have the drive watch our heartbeat and prove that it stops without it. Held; its fault may feather the blades.
+         */
+        post: operations["prepare"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/live/devices/{turbine}/{station}/{device}/motion/put-back": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Put Back
+         * @description End the preparation: the settings from before stand again.
+         */
+        post: operations["put_back"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/live/devices/{turbine}/{station}/{device}/motion/reset": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Reset
+         * @description Reset the fault of the axis; nothing moves by it.
+         */
+        post: operations["reset"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/live/devices/{turbine}/{station}/{device}/motor": {
         parameters: {
             query?: never;
@@ -711,6 +1053,146 @@ export interface paths {
          * @description End a job; what it did by then stays done.
          */
         delete: operations["cancel_job"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/live/motion": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Motion
+         * @description Who may move the axes, what is prepared and under way. The socket has it as topic ``motion``.
+         */
+        get: operations["motion"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/live/motion/confirm": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Confirm
+         * @description What the holder has looked at: the rotor is locked, and nobody is in the hub.
+         */
+        post: operations["confirm"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/live/motion/lease": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Take Lease
+         * @description Take the lease, or keep it; another page's is refused with 409 ``lease_held``.
+         */
+        post: operations["take_lease"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/live/motion/lease/answer": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Answer Wish
+         * @description The holder's answer to who asks: hand the lease over, or keep it.
+         */
+        post: operations["answer_wish"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/live/motion/lease/ask": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Ask For Lease
+         * @description Ask its holder for the lease. Once it is had, taking it tells its number.
+         */
+        post: operations["ask_for_lease"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/live/motion/lease/give-back": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Give Back Lease
+         * @description End the lease; what was prepared is put back.
+         */
+        post: operations["give_back_lease"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/live/motion/lease/withdraw": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Withdraw Wish
+         * @description Ask for the lease no longer.
+         */
+        post: operations["withdraw_wish"];
+        delete?: never;
         options?: never;
         head?: never;
         patch?: never;
@@ -905,7 +1387,7 @@ export interface paths {
         };
         /**
          * Turbine
-         * @description The connected turbine with its stations and devices; null where none is connected.
+         * @description The turbine that is shown, with its stations and devices; null where none is connected.
          */
         get: operations["turbine"];
         put?: never;
@@ -1294,6 +1776,70 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/recordings/import": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Import Recording
+         * @description Make a recording of a file of another tool: candump, ASC, BLF, TRC, CSV or MCAP. The body is the file.
+         */
+        post: operations["import_recording"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/recordings/made/{job_id}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Exchange Job
+         * @description How an import, cut, merge or anonymised copy stands, and what came of it.
+         */
+        get: operations["exchange_job"];
+        put?: never;
+        post?: never;
+        /**
+         * Cancel Exchange
+         * @description End it; nothing half made is left.
+         */
+        delete: operations["cancel_exchange"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/recordings/merge": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Merge Recordings
+         * @description Make one recording of several: parts of one, or of several buses.
+         */
+        post: operations["merge_recordings"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/recordings/{name}": {
         parameters: {
             query?: never;
@@ -1308,6 +1854,50 @@ export interface paths {
         get: operations["recording"];
         put?: never;
         post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/recordings/{name}/annotations": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Annotations
+         * @description The annotations of a recording, after a look at the file beside it; also of one that is gone.
+         */
+        get: operations["list_annotations"];
+        put?: never;
+        /**
+         * Annotate
+         * @description Mark a point or a stretch of a recording.
+         */
+        post: operations["annotate"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/recordings/{name}/anonymise": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Anonymise Recording
+         * @description Make a copy that does not tell whose recording it is.
+         */
+        post: operations["anonymise_recording"];
         delete?: never;
         options?: never;
         head?: never;
@@ -1334,6 +1924,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/recordings/{name}/cut": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Cut Recording
+         * @description Make a recording of a part of one, beside it, that replays from its beginning.
+         */
+        post: operations["cut_recording"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/recordings/{name}/download": {
         parameters: {
             query?: never;
@@ -1346,6 +1956,66 @@ export interface paths {
          * @description The file; of the one that is being written what it holds now.
          */
         get: operations["download_recording"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/recordings/{name}/export": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Export Recording
+         * @description A recording, or a part of it, in another format, to download.
+         */
+        get: operations["export_recording"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/recordings/{name}/key-events": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Recording Key Events
+         * @description The next trips, errors and warnings after a time, or those before it, the nearest first.
+         */
+        get: operations["recording_key_events"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/recordings/{name}/losses": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Export Losses
+         * @description What the format cannot hold of a recording: every frame is looked at, before anything is exported.
+         */
+        get: operations["export_losses"];
         put?: never;
         post?: never;
         delete?: never;
@@ -1374,6 +2044,46 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/recordings/{name}/table": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Export Table
+         * @description The decoded signals of a recording as Apache Parquet, to download.
+         */
+        get: operations["export_table"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/recordings/{name}/trips": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Recording Trips
+         * @description The trips of a recording, each with what came first. It must have an index.
+         */
+        get: operations["recording_trips"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/records/{record_file}": {
         parameters: {
             query?: never;
@@ -1386,6 +2096,354 @@ export interface paths {
          * @description The signed record of a restore: ``<id>.html``, ``<id>.pdf`` or ``<id>.json``.
          */
         get: operations["record_file"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/replay": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Replays
+         * @description All replays that are open.
+         */
+        get: operations["replays"];
+        put?: never;
+        /**
+         * Open Replay
+         * @description Replay a recording. Where somebody replays it already it is the same replay, with the same cursor.
+         */
+        post: operations["open_replay"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/replay/{replay_id}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Replay
+         * @description One replay as it is now.
+         */
+        get: operations["replay"];
+        put?: never;
+        post?: never;
+        /**
+         * End Replay
+         * @description Close it, for all who look at it.
+         */
+        delete: operations["end_replay"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/replay/{replay_id}/bus/emergencies": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Replay Bus Emergencies
+         * @description Emergency messages, newest first.
+         */
+        get: operations["replay_bus_emergencies"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/replay/{replay_id}/bus/identifiers": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Replay Bus Identifiers
+         * @description All CAN identifiers that were seen: latest data, count, rate, period, share of the load.
+         */
+        get: operations["replay_bus_identifiers"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/replay/{replay_id}/bus/load": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Replay Bus Load
+         * @description Load of each bus now and second by second, with the share of each node.
+         */
+        get: operations["replay_bus_load"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/replay/{replay_id}/bus/nodes": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Replay Bus Nodes
+         * @description All nodes that were seen on the buses, and those that the site names.
+         */
+        get: operations["replay_bus_nodes"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/replay/{replay_id}/bus/transfers": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Replay Bus Transfers
+         * @description SDO transfers, newest first: all, only writes and what did not succeed, or only what did not succeed.
+         */
+        get: operations["replay_bus_transfers"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/replay/{replay_id}/cursor": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Move Cursor
+         * @description Move the cursor, for all who look; the answer tells where it stands when the state there is known.
+         */
+        post: operations["move_cursor"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/replay/{replay_id}/descriptions/{description_id}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Replay Description
+         * @description Everything that is known of a device's objects.
+         */
+        get: operations["replay_description"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/replay/{replay_id}/events": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Replay Events
+         * @description All that the devices told and that was noted, by time.
+         */
+        get: operations["replay_events"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/replay/{replay_id}/frames": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Replay Frames
+         * @description Decoded frames before, after or around a moment: from memory, and what is older from the running recording.
+         */
+        get: operations["replay_frames"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/replay/{replay_id}/history": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Replay History
+         * @description When RAM of an object changed.
+         */
+        get: operations["replay_history"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/replay/{replay_id}/series": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Replay Series
+         * @description Signals over time, each in at most about so many points: exact where they are few, else least and greatest.
+         */
+        get: operations["replay_series"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/replay/{replay_id}/sets": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Keep Moment
+         * @description Keep what was known at a moment as sets of the library: candidates for a restore, which happens live.
+         */
+        post: operations["keep_moment"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/replay/{replay_id}/signals": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Replay Signals
+         * @description Every described number that crossed the wire.
+         */
+        get: operations["replay_signals"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/replay/{replay_id}/timeline": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Replay Timeline
+         * @description Load, gaps and the events that matter most, of the whole recording or a part of it.
+         */
+        get: operations["replay_timeline"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/replay/{replay_id}/turbine": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Replay Turbine
+         * @description The turbine that is shown, with its stations and devices; null where none is connected.
+         */
+        get: operations["replay_turbine"];
         put?: never;
         post?: never;
         delete?: never;
@@ -1429,6 +2487,70 @@ export interface paths {
          */
         post: operations["check_rules"];
         delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/search": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Search Recordings
+         * @description Search recordings for a signature, in the background; results come as they are found.
+         */
+        post: operations["search_recordings"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/search/signature": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Read Signature
+         * @description A signature as it is understood, without searching. The problem names the character where it is not.
+         */
+        post: operations["read_signature"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/search/{job_id}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Recording Search
+         * @description How a search stands, with the hits that are not known yet.
+         */
+        get: operations["recording_search"];
+        put?: never;
+        post?: never;
+        /**
+         * Cancel Recording Search
+         * @description End a search; what it has found stays.
+         */
+        delete: operations["cancel_recording_search"];
         options?: never;
         head?: never;
         patch?: never;
@@ -1943,6 +3065,214 @@ export interface components {
             places: components["schemas"]["PlaceDoc"][];
         };
         /**
+         * AlignDoc
+         * @description Recordings on one axis, in the order in which they were asked for.
+         */
+        AlignDoc: {
+            /** Recordings */
+            recordings: components["schemas"]["AlignedDoc"][];
+        };
+        /**
+         * AlignRequest
+         * @description Recordings side by side, each by its own zero, from ``before_ms`` before to ``after_ms`` behind it.
+         *
+         *     ``points``: how many stretches the window has at most, such as the pixels of the plot.
+         */
+        AlignRequest: {
+            /**
+             * After Ms
+             * @default 20000
+             */
+            after_ms: number;
+            /**
+             * Before Ms
+             * @default 10000
+             */
+            before_ms: number;
+            /**
+             * Points
+             * @default 1000
+             */
+            points: number;
+            /** Recordings */
+            recordings: components["schemas"]["AnchorAt"][];
+            /** Signals */
+            signals: components["schemas"]["SignalWanted"][];
+        };
+        /**
+         * AlignedDoc
+         * @description One recording: its turbine and its zero (for the label), how far it reaches, its curves.
+         *
+         *     ``problem`` says why there are none: a text key with its details.
+         */
+        AlignedDoc: {
+            /** From Ms */
+            from_ms: number;
+            /** Name */
+            name: string;
+            /** Problem */
+            problem?: string | null;
+            /**
+             * Problem Details
+             * @default {}
+             */
+            problem_details: {
+                [key: string]: unknown;
+            };
+            /** T0 Ns */
+            t0_ns: number | null;
+            /** To Ms */
+            to_ms: number;
+            /** Tracks */
+            tracks: components["schemas"]["TrackDoc"][];
+            /** Turbine */
+            turbine: string;
+        };
+        /**
+         * AllPart
+         * @description Each of these somewhere in the recording.
+         */
+        "AllPart-Input": {
+            /** Parts */
+            parts: (components["schemas"]["EventPart"] | components["schemas"]["LevelPart"] | components["schemas"]["PairPart-Input"] | components["schemas"]["AllPart-Input"] | components["schemas"]["AnyPart-Input"] | components["schemas"]["NotPart-Input"])[];
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            type: "all";
+        };
+        /**
+         * AllPart
+         * @description Each of these somewhere in the recording.
+         */
+        "AllPart-Output": {
+            /** Parts */
+            parts: (components["schemas"]["EventPart"] | components["schemas"]["LevelPart"] | components["schemas"]["PairPart-Output"] | components["schemas"]["AllPart-Output"] | components["schemas"]["AnyPart-Output"] | components["schemas"]["NotPart-Output"])[];
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            type: "all";
+        };
+        /**
+         * AnchorAt
+         * @description A recording and its zero: T0 of its trip number ``trip``, or the moment ``t_ns``; exactly one of them.
+         */
+        AnchorAt: {
+            /** Name */
+            name: string;
+            /** T Ns */
+            t_ns?: number | null;
+            /** Trip */
+            trip?: number | null;
+        };
+        /**
+         * AnnotationDoc
+         * @description One annotation. ``incident`` is an id; ``foreign``: another program made it; ``extra`` is what it says besides.
+         *
+         *     ``problem``: it is kept, but the file beside the recording could not be written, and why.
+         */
+        AnnotationDoc: {
+            /** Colour */
+            colour: string;
+            /** Extra */
+            extra: {
+                [key: string]: string;
+            };
+            /** Foreign */
+            foreign: boolean;
+            /** From Ns */
+            from_ns: number;
+            /** Id */
+            id: string;
+            /** Incident */
+            incident: string | null;
+            /** Person */
+            person: string;
+            /** Problem */
+            problem?: string | null;
+            /** Recording */
+            recording: string;
+            /**
+             * Severity
+             * @enum {string}
+             */
+            severity: "info" | "warning" | "error";
+            /** T Ns */
+            t_ns: number;
+            /** Text */
+            text: string;
+            /** To Ns */
+            to_ns: number;
+        };
+        /**
+         * AnnotationList
+         * @description The annotations of a recording by time, and the file beside it. ``problem``: why that file is no good.
+         */
+        AnnotationList: {
+            /** Annotations */
+            annotations: components["schemas"]["AnnotationDoc"][];
+            /** File */
+            file: string | null;
+            /** Problem */
+            problem: string | null;
+        };
+        /**
+         * AnonymiseRequest
+         * @description ``objects`` are hidden on every node beside the serial number; a copy that holds one of ``words`` is refused.
+         */
+        AnonymiseRequest: {
+            /**
+             * Hide Times
+             * @default false
+             */
+            hide_times: boolean;
+            /** Objects */
+            objects?: string[];
+            /** Words */
+            words?: string[];
+        };
+        /**
+         * AnswerRequest
+         * @description The holder's answer to who asks for the lease.
+         * @example {
+         *       "fence": 1764029382123456,
+         *       "hand_over": true
+         *     }
+         */
+        AnswerRequest: {
+            /** Fence */
+            fence: number;
+            /** Hand Over */
+            hand_over: boolean;
+        };
+        /**
+         * AnyPart
+         * @description At least one of these.
+         */
+        "AnyPart-Input": {
+            /** Parts */
+            parts: (components["schemas"]["EventPart"] | components["schemas"]["LevelPart"] | components["schemas"]["PairPart-Input"] | components["schemas"]["AllPart-Input"] | components["schemas"]["AnyPart-Input"] | components["schemas"]["NotPart-Input"])[];
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            type: "any";
+        };
+        /**
+         * AnyPart
+         * @description At least one of these.
+         */
+        "AnyPart-Output": {
+            /** Parts */
+            parts: (components["schemas"]["EventPart"] | components["schemas"]["LevelPart"] | components["schemas"]["PairPart-Output"] | components["schemas"]["AllPart-Output"] | components["schemas"]["AnyPart-Output"] | components["schemas"]["NotPart-Output"])[];
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            type: "any";
+        };
+        /**
          * AssignedDoc
          * @description Which motor a device drives, as somebody said or as it was put into the device.
          */
@@ -2071,9 +3401,8 @@ export interface components {
             /**
              * Ctx
              * @default live
-             * @constant
              */
-            ctx: "live";
+            ctx: string;
             /** Data */
             data: components["schemas"]["AxisLine"][];
             /** Seq */
@@ -2182,6 +3511,32 @@ export interface components {
             reason: string;
         };
         /**
+         * Beat
+         * @description The dead man: a page that has the lease says that it is there, and whether its person holds what moves an axis.
+         *
+         *     ``fence`` is the number of the lease, ``number`` rises with each beat, ``order`` is that of what is held.
+         */
+        Beat: {
+            /** Fence */
+            fence: number;
+            /** Holding */
+            holding: boolean;
+            /** Number */
+            number: number;
+            /**
+             * Order
+             * @default 0
+             */
+            order: number;
+            /** Page */
+            page: string;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            type: "beat";
+        };
+        /**
          * BenchData
          * @description What is connected; ``epoch`` is raised with every connection that is made or ended.
          */
@@ -2200,9 +3555,8 @@ export interface components {
             /**
              * Ctx
              * @default live
-             * @constant
              */
-            ctx: "live";
+            ctx: string;
             data: components["schemas"]["BenchData"];
             /** Seq */
             seq: number;
@@ -2243,12 +3597,19 @@ export interface components {
         /**
          * BusDoc
          * @description A bus of a turbine; ``bitrate`` 0: the connection names it.
+         *
+         *     ``heartbeat_node``: as whom this tool beats on it while axes are moved.
          */
         BusDoc: {
             /** Bitrate */
             bitrate: number;
             /** Connection */
             connection: string;
+            /**
+             * Heartbeat Node
+             * @default 126
+             */
+            heartbeat_node: number;
             /** Name */
             name: string;
         };
@@ -2396,6 +3757,20 @@ export interface components {
             unit: string;
         };
         /**
+         * ChangeLine
+         * @description RAM of an object from ``t_ns`` on; ``raw`` None: unknown from here.
+         */
+        ChangeLine: {
+            /** Hex */
+            hex: string | null;
+            /** Raw */
+            raw: number | string | null;
+            /** Source */
+            source: ("sdo-read" | "sdo-write" | "pdo" | "emcy") | null;
+            /** T Ns */
+            t_ns: number;
+        };
+        /**
          * ChangedDevice
          * @description One device; ``missing`` is the side on which nothing is known of it, ``replaced`` that another one answers.
          */
@@ -2453,21 +3828,7 @@ export interface components {
             state: "no-earlier-visit" | "reading" | "ready";
             visit: components["schemas"]["VisitDoc"] | null;
         };
-        /**
-         * Subscribe
-         * @description What the page wants to hear; replaces what it wanted before. ``trace`` is the filter of the topic ``trace``.
-         */
-        ClientMessage: {
-            /** Topics */
-            topics: string[];
-            /** @default null */
-            trace: components["schemas"]["TraceFilter"] | null;
-            /**
-             * Type
-             * @constant
-             */
-            type: "subscribe";
-        };
+        ClientMessage: components["schemas"]["Subscribe"] | components["schemas"]["Beat"];
         /**
          * ColumnDoc
          * @description What stands above a column. ``t_ns`` null: of no time, as defaults; ``twin`` null: nothing says what it is of.
@@ -2489,7 +3850,7 @@ export interface components {
              * Kind
              * @enum {string}
              */
-            kind: "live" | "stored" | "editor" | "default" | "set" | "file" | "golden" | "delivered" | "found" | "left" | "year" | "latest";
+            kind: "live" | "stored" | "editor" | "default" | "set" | "file" | "golden" | "delivered" | "found" | "left" | "year" | "latest" | "moment";
             /** Person */
             person: string;
             /** Reason */
@@ -2570,6 +3931,12 @@ export interface components {
             state: "same" | "different" | "unit" | "missing" | "not-comparable";
         };
         /**
+         * Comparison
+         * @description How a value is compared.
+         * @enum {string}
+         */
+        Comparison: ">" | ">=" | "<" | "<=" | "=" | "!=";
+        /**
          * ComparisonDoc
          * @description Columns side by side: all rows, group by group; the page hides those that are the same.
          */
@@ -2581,12 +3948,125 @@ export interface components {
             summary: components["schemas"]["SummaryDoc"];
         };
         /**
+         * ConfirmRequest
+         * @description What the holder has looked at.
+         * @example {
+         *       "fence": 1764029382123456,
+         *       "people_out": true,
+         *       "rotor_locked": true
+         *     }
+         */
+        ConfirmRequest: {
+            /** Fence */
+            fence: number;
+            /** People Out */
+            people_out: boolean;
+            /** Rotor Locked */
+            rotor_locked: boolean;
+        };
+        /**
          * ConnectRequest
          * @description ``turbine`` is the slug of one that is known.
          */
         ConnectRequest: {
             /** Turbine */
             turbine: string;
+        };
+        /**
+         * CursorLine
+         * @description The cursor of a replay. Times in t_ns.
+         *
+         *     ``speed`` is what was asked for, ``attained`` what the last second really made; both 1 is as it happened. None: it
+         *     stands still, or has not played for long enough to tell.
+         *     ``from_ns`` and ``to_ns`` bound the recording. ``seeking``: the state at the cursor is being made.
+         */
+        CursorLine: {
+            /** Attained */
+            attained: number | null;
+            /** From Ns */
+            from_ns: number;
+            loop: components["schemas"]["LoopLine"] | null;
+            /** Playing */
+            playing: boolean;
+            /** Seeking */
+            seeking: boolean;
+            /** Speed */
+            speed: number;
+            /** T Ns */
+            t_ns: number;
+            /** To Ns */
+            to_ns: number;
+        };
+        /**
+         * CursorMessage
+         * @description Topic ``cursor``: where a replay stands, where it moved, at most 50 times a second.
+         */
+        CursorMessage: {
+            /**
+             * Ctx
+             * @default live
+             */
+            ctx: string;
+            data: components["schemas"]["CursorLine"];
+            /** Seq */
+            seq: number;
+            /** T Ns */
+            t_ns: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            type: "cursor";
+            /**
+             * V
+             * @default 1
+             * @constant
+             */
+            v: 1;
+        };
+        /**
+         * CursorRequest
+         * @description What the cursor is to do.
+         *
+         *     ``play`` (with ``speed``, where given), ``pause``, ``seek`` (to ``t_ns``), ``step`` (by ``dt_ms``, or with ``by`` to
+         *     the next frame or event, backwards with ``forward`` false), ``speed``, ``loop`` (null: no more).
+         */
+        CursorRequest: {
+            /**
+             * Action
+             * @enum {string}
+             */
+            action: "play" | "pause" | "seek" | "step" | "speed" | "loop";
+            /**
+             * By
+             * @default time
+             * @enum {string}
+             */
+            by: "time" | "frame" | "event";
+            /** Dt Ms */
+            dt_ms?: number | null;
+            /**
+             * Forward
+             * @default true
+             */
+            forward: boolean;
+            loop?: components["schemas"]["LoopRef"] | null;
+            /** Speed */
+            speed?: number | null;
+            /** T Ns */
+            t_ns?: number | null;
+        };
+        /**
+         * CutRequest
+         * @description From ``start_ns`` on and before ``end_ns``; null: from the beginning, to the end. ``buses`` null: all.
+         */
+        CutRequest: {
+            /** Buses */
+            buses?: string[] | null;
+            /** End Ns */
+            end_ns?: number | null;
+            /** Start Ns */
+            start_ns?: number | null;
         };
         /**
          * DamageRef
@@ -2611,6 +4091,32 @@ export interface components {
             id: string;
             /** Name */
             name: string;
+        };
+        /**
+         * DeskView
+         * @description Plots under a name, as a link holds them: signals without their turbine, so that they fit any of the kind.
+         */
+        DeskView: {
+            /** Name */
+            name: string;
+            /** Plots */
+            plots: string;
+        };
+        /**
+         * DeskViews
+         * @description The views of a person, in the person's own order; each name once.
+         * @example {
+         *       "views": [
+         *         {
+         *           "name": "mains",
+         *           "plots": "blade-1/pmm/3062,blade-2/pmm/3062;blade-1/pmm/3063"
+         *         }
+         *       ]
+         *     }
+         */
+        DeskViews: {
+            /** Views */
+            views: components["schemas"]["DeskView"][];
         };
         /**
          * DeviceRef
@@ -2694,6 +4200,20 @@ export interface components {
             t_ns: number;
         };
         /**
+         * EndedLine
+         * @description The last motion and why it ended; ``error`` is the code of what failed, None where nothing did.
+         */
+        EndedLine: {
+            /** Device */
+            device: string;
+            /** Doing */
+            doing: string;
+            /** Error */
+            error: string | null;
+            /** Why */
+            why: string;
+        };
+        /**
          * EventLine
          * @description One event; ``details`` fill the placeholders of the text, those that end in ``_key`` are text keys.
          *
@@ -2706,10 +4226,7 @@ export interface components {
             };
             /** Device */
             device: string | null;
-            /**
-             * Person
-             * @default null
-             */
+            /** Person */
             person: string | null;
             /**
              * Severity
@@ -2729,9 +4246,8 @@ export interface components {
             /**
              * Ctx
              * @default live
-             * @constant
              */
-            ctx: "live";
+            ctx: string;
             data: components["schemas"]["EventLine"];
             /** Seq */
             seq: number;
@@ -2748,6 +4264,57 @@ export interface components {
              * @constant
              */
             v: 1;
+        };
+        /**
+         * EventPart
+         * @description A sign, a trip, any error or any warning. ``code``: of an emergency message; ``ended``: the condition's end.
+         */
+        EventPart: {
+            /** Code */
+            code?: number | null;
+            /**
+             * Ended
+             * @default false
+             */
+            ended: boolean;
+            /** Kind */
+            kind: components["schemas"]["SignKind"] | components["schemas"]["Special"];
+            /** @default {} */
+            scope: components["schemas"]["ScopeDoc"];
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            type: "event";
+        };
+        /**
+         * ExchangeJob
+         * @description How it stands: ``done`` counts frames (of a cut percent), ``files`` are the names of what was made.
+         */
+        ExchangeJob: {
+            /**
+             * Action
+             * @enum {string}
+             */
+            action: "import" | "cut" | "merge" | "anonymise";
+            /** Done */
+            done: number;
+            error: components["schemas"]["Failure"] | null;
+            /** Files */
+            files: string[];
+            /** Frames */
+            frames: number;
+            /** Id */
+            id: string;
+            /** Remarks */
+            remarks: components["schemas"]["Remark"][];
+            /** Skipped */
+            skipped: components["schemas"]["SkippedLine"][];
+            /**
+             * State
+             * @enum {string}
+             */
+            state: "running" | "done" | "failed" | "cancelled";
         };
         /**
          * Failure
@@ -2860,6 +4427,29 @@ export interface components {
         Favourites: {
             /** Addresses */
             addresses: string[];
+        };
+        /**
+         * FenceRequest
+         * @description What the holder of lease ``fence`` asks.
+         * @example {
+         *       "fence": 1764029382123456
+         *     }
+         */
+        FenceRequest: {
+            /** Fence */
+            fence: number;
+        };
+        /**
+         * FlawDoc
+         * @description A member of a bundle that was not taken, and why.
+         */
+        FlawDoc: {
+            /** Detail */
+            detail: string;
+            /** Member */
+            member: string;
+            /** Reason Key */
+            reason_key: string;
         };
         /**
          * FleetAddress
@@ -2989,6 +4579,12 @@ export interface components {
             t_ns: number;
         };
         /**
+         * Format
+         * @description A file format.
+         * @enum {string}
+         */
+        Format: "candump" | "asc" | "blf" | "trc" | "csv" | "mcap";
+        /**
          * FoundDoc
          * @description A device that answered, and where it might belong; null where it does not say.
          */
@@ -3023,12 +4619,62 @@ export interface components {
             vendor: number | null;
         };
         /**
+         * GapLine
+         * @description A stretch in which the recording does not hold everything; ``text_key`` with ``details`` says why.
+         */
+        GapLine: {
+            /** Bus */
+            bus: string;
+            /** Details */
+            details: {
+                [key: string]: unknown;
+            };
+            /** Device */
+            device: string | null;
+            /** From Ns */
+            from_ns: number;
+            /** Kind */
+            kind: string;
+            /** Text Key */
+            text_key: string;
+            /** To Ns */
+            to_ns: number;
+        };
+        /**
          * GiveUpRequest
          * @description Why a restore is closed although the station may hold old and new values.
          */
         GiveUpRequest: {
             /** Reason */
             reason: string;
+        };
+        /**
+         * GoneMessage
+         * @description The replay ``ctx`` is not open, or no longer: open it again to hear of it.
+         */
+        GoneMessage: {
+            /**
+             * Ctx
+             * @default live
+             */
+            ctx: string;
+            /** @default {} */
+            data: components["schemas"]["Nothing"];
+            /** Seq */
+            seq: number;
+            /** T Ns */
+            t_ns: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            type: "gone";
+            /**
+             * V
+             * @default 1
+             * @constant
+             */
+            v: 1;
         };
         /**
          * HeardDoc
@@ -3071,9 +4717,8 @@ export interface components {
             /**
              * Ctx
              * @default live
-             * @constant
              */
-            ctx: "live";
+            ctx: string;
             /** @default {} */
             data: components["schemas"]["Nothing"];
             /** Seq */
@@ -3110,9 +4755,8 @@ export interface components {
             /**
              * Ctx
              * @default live
-             * @constant
              */
-            ctx: "live";
+            ctx: string;
             data: components["schemas"]["Hello"];
             /** Seq */
             seq: number;
@@ -3129,6 +4773,202 @@ export interface components {
              * @constant
              */
             v: 1;
+        };
+        /**
+         * HitDoc
+         * @description A place that matches: jump to ``t_ns`` of the recording ``name``; ``from_ns`` to ``to_ns`` is what matched.
+         */
+        HitDoc: {
+            /** Bus */
+            bus: string | null;
+            /** From Ns */
+            from_ns: number;
+            /** Name */
+            name: string;
+            /** Node */
+            node: number | null;
+            says: components["schemas"]["WordsDoc"];
+            /** T Ns */
+            t_ns: number;
+            /** To Ns */
+            to_ns: number;
+            /** Turbine */
+            turbine: string;
+        };
+        /**
+         * HomeRequest
+         * @description Take the present position for this angle.
+         * @example {
+         *       "angle_deg": 90,
+         *       "fence": 1764029382123456,
+         *       "order": 4
+         *     }
+         */
+        HomeRequest: {
+            /** Angle Deg */
+            angle_deg: number;
+            /** Fence */
+            fence: number;
+            /** Order */
+            order: number;
+        };
+        /**
+         * IncidentChange
+         * @description Another version, made from version ``based_on``.
+         * @example {
+         *       "at_ns": 1750000020000000000,
+         *       "based_on": 1,
+         *       "camera": "blade-2",
+         *       "from_ns": 1750000000000000000,
+         *       "loop": {
+         *         "from_ns": 1750000015000000000,
+         *         "to_ns": 1750000025000000000
+         *       },
+         *       "notes": "Grease on the gear; cleaned.",
+         *       "plots": [
+         *         [
+         *           "wtg-07/blade-2/pmc/6064",
+         *           "wtg-07/blade-2/pmc/60F4"
+         *         ]
+         *       ],
+         *       "tags": [
+         *         "8611h"
+         *       ],
+         *       "title": "Blade 2 trips on following error",
+         *       "to_ns": 1750000030000000000
+         *     }
+         */
+        IncidentChange: {
+            /** At Ns */
+            at_ns: number;
+            /** Based On */
+            based_on: number;
+            /**
+             * Camera
+             * @default
+             */
+            camera: string;
+            /** From Ns */
+            from_ns: number;
+            loop?: components["schemas"]["LoopRef"] | null;
+            /**
+             * Notes
+             * @default
+             */
+            notes: string;
+            /**
+             * Plots
+             * @default []
+             */
+            plots: string[][];
+            /**
+             * Tags
+             * @default []
+             */
+            tags: string[];
+            /** Title */
+            title: string;
+            /** To Ns */
+            to_ns: number;
+        };
+        /**
+         * IncidentDoc
+         * @description One version of an incident.
+         *
+         *     ``link`` is its short link, ``page`` where that leads. ``recording_state``: whether its recording is there;
+         *     ``replay`` names the replay of it, null where it cannot be replayed. ``sha256`` of the recording, once it is known.
+         */
+        IncidentDoc: {
+            /** At Ns */
+            at_ns: number;
+            /** Author */
+            author: string;
+            /** Camera */
+            camera: string;
+            /** Code */
+            code: string;
+            /** Created Ns */
+            created_ns: number;
+            /** From Ns */
+            from_ns: number;
+            /** Hidden */
+            hidden: boolean;
+            /** Id */
+            id: string;
+            /** Link */
+            link: string;
+            loop: components["schemas"]["LoopRef"] | null;
+            /** Notes */
+            notes: string;
+            origin: components["schemas"]["OriginDoc"] | null;
+            /** Page */
+            page: string;
+            /** Person */
+            person: string;
+            /** Plots */
+            plots: string[][];
+            /** Recording */
+            recording: string;
+            /**
+             * Recording State
+             * @enum {string}
+             */
+            recording_state: "there" | "grown" | "moved" | "other" | "gone";
+            /** Recording Text Key */
+            recording_text_key: string;
+            /** Replay */
+            replay: string | null;
+            /** Sha256 */
+            sha256: string | null;
+            /** T Ns */
+            t_ns: number;
+            /** Tags */
+            tags: string[];
+            /** Title */
+            title: string;
+            /** To Ns */
+            to_ns: number;
+            /** Turbine */
+            turbine: string;
+            /** Version */
+            version: number;
+        };
+        /**
+         * IncidentTaken
+         * @description What a bundle brought. ``incident`` null: it was not whole; ``new``: it was not here before.
+         *
+         *     ``recording`` is the name of its file here, null where none was whole or came along. ``lacking``: text keys of what
+         *     could not be put in when it was made.
+         */
+        IncidentTaken: {
+            /** Annotations */
+            annotations: number;
+            /** Flaws */
+            flaws: components["schemas"]["FlawDoc"][];
+            incident: components["schemas"]["IncidentDoc"] | null;
+            /** Lacking */
+            lacking: string[];
+            /** New */
+            new: boolean;
+            /** Recording */
+            recording: string | null;
+            /** Sets */
+            sets: number;
+        };
+        /**
+         * IndexLine
+         * @description How the index of a recording stands: ``progress`` 0 to 1, and the ``reason`` why there is none.
+         */
+        IndexLine: {
+            /** Progress */
+            progress: number;
+            /** Reason */
+            reason: string | null;
+            /**
+             * State
+             * @enum {string}
+             */
+            state: "ready" | "building" | "failed";
         };
         /**
          * InjectedLine
@@ -3175,9 +5015,8 @@ export interface components {
             /**
              * Ctx
              * @default live
-             * @constant
              */
-            ctx: "live";
+            ctx: string;
             data: components["schemas"]["InstructorLine"];
             /** Seq */
             seq: number;
@@ -3194,6 +5033,20 @@ export interface components {
              * @constant
              */
             v: 1;
+        };
+        /**
+         * InterlockDoc
+         * @description How an interlock stands; ``details`` fill its texts ``interlock.<name>.clear`` and ``.bites``.
+         */
+        InterlockDoc: {
+            /** Details */
+            details: {
+                [key: string]: unknown;
+            };
+            /** Holds Back */
+            holds_back: boolean;
+            /** Name */
+            name: string;
         };
         /**
          * JobDoc
@@ -3245,6 +5098,50 @@ export interface components {
             was_raw: number | string | null;
         };
         /**
+         * JobState
+         * @description How a job stands.
+         * @enum {string}
+         */
+        JobState: "running" | "done" | "failed" | "cancelled";
+        /**
+         * JogRequest
+         * @description Turn the blade at a speed while it is held; negative: towards 0 degrees.
+         * @example {
+         *       "fence": 1764029382123456,
+         *       "order": 2,
+         *       "speed_dps": -2
+         *     }
+         */
+        JogRequest: {
+            /** Fence */
+            fence: number;
+            /** Order */
+            order: number;
+            /** Speed Dps */
+            speed_dps: number;
+        };
+        /**
+         * KeyEventDoc
+         * @description Something to jump to, at ``t_ns``. ``trip`` is the place of a trip among those of the recording.
+         */
+        KeyEventDoc: {
+            /** At */
+            at: components["schemas"]["NodeAt"][];
+            kind: components["schemas"]["KeyKind"];
+            says: components["schemas"]["WordsDoc"];
+            sign: components["schemas"]["SignKind"];
+            /** T Ns */
+            t_ns: number;
+            /** Trip */
+            trip: number | null;
+        };
+        /**
+         * KeyKind
+         * @description What is jumped to.
+         * @enum {string}
+         */
+        KeyKind: "trip" | "error" | "warning";
+        /**
          * KnownTurbine
          * @description A turbine of the site file; ``buses`` are the adapters that it is reached by.
          */
@@ -3257,6 +5154,37 @@ export interface components {
             name: string;
             /** Slug */
             slug: string;
+        };
+        /**
+         * LeaseDoc
+         * @description The lease of the page that asks: ``fence`` goes with every order and beat. None: it was asked for.
+         */
+        LeaseDoc: {
+            /** Fence */
+            fence: number | null;
+        };
+        /**
+         * LeaseLine
+         * @description Who has the lease, or asks for it; at ``until_ns`` of t_ns, to a second, it ends, or goes over unanswered.
+         */
+        LeaseLine: {
+            /** Page */
+            page: string;
+            /** Person */
+            person: string;
+            /** Until Ns */
+            until_ns: number;
+        };
+        /**
+         * LeaseRequest
+         * @description Who wants the lease.
+         * @example {
+         *       "page": "5f2c1d"
+         *     }
+         */
+        LeaseRequest: {
+            /** Page */
+            page: string;
         };
         /**
          * LeftNow
@@ -3278,6 +5206,39 @@ export interface components {
             unread: number;
             /** Writes */
             writes: number;
+        };
+        /**
+         * LevelPart
+         * @description A signal on one side of a number (scaled) for at least ``lasting_ms``; ``amount``: without its sign.
+         */
+        LevelPart: {
+            /**
+             * Amount
+             * @default false
+             */
+            amount: boolean;
+            comparison: components["schemas"]["Comparison"];
+            /**
+             * Lasting Ms
+             * @default 0
+             */
+            lasting_ms: number;
+            /** Number */
+            number: number;
+            /** Object */
+            object: string;
+            /** @default {} */
+            scope: components["schemas"]["ScopeDoc"];
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            type: "level";
+            /**
+             * Unit
+             * @default
+             */
+            unit: string;
         };
         /**
          * LibraryDoc
@@ -3310,7 +5271,7 @@ export interface components {
              * Mode
              * @enum {string}
              */
-            mode: "live" | "twin" | "none";
+            mode: "live" | "twin" | "none" | "replay";
             /** Needs Consent */
             needs_consent: boolean;
             /** Other Masters */
@@ -3332,9 +5293,8 @@ export interface components {
             /**
              * Ctx
              * @default live
-             * @constant
              */
-            ctx: "live";
+            ctx: string;
             data: components["schemas"]["LinkLine"];
             /** Seq */
             seq: number;
@@ -3351,6 +5311,18 @@ export interface components {
              * @constant
              */
             v: 1;
+        };
+        /**
+         * LoadLine
+         * @description Traffic of one bus by bucket: share of the bit time (None: bit rate not known), and frames.
+         */
+        LoadLine: {
+            /** Bus */
+            bus: string;
+            /** Frames */
+            frames: number[];
+            /** Share */
+            share: (number | null)[];
         };
         /**
          * LoadSecondLine
@@ -3400,6 +5372,42 @@ export interface components {
             password: string;
         };
         /**
+         * LoopLine
+         * @description What is played over and over, in t_ns.
+         */
+        LoopLine: {
+            /** From Ns */
+            from_ns: number;
+            /** To Ns */
+            to_ns: number;
+        };
+        /**
+         * LoopRef
+         * @description A stretch of the recording.
+         */
+        LoopRef: {
+            /** From Ns */
+            from_ns: number;
+            /** To Ns */
+            to_ns: number;
+        };
+        /**
+         * LossDoc
+         * @description What a format cannot hold: ``text_key`` with ``details`` is its text.
+         */
+        LossDoc: {
+            /** Details */
+            details: {
+                [key: string]: unknown;
+            };
+            /** Text Key */
+            text_key: string;
+            /** Things */
+            things: number;
+            /** What */
+            what: string;
+        };
+        /**
          * LossRef
          * @description An event that tells of frames that are missing; ``text_key`` with ``details`` is its text.
          */
@@ -3412,6 +5420,46 @@ export interface components {
             t_ns: number;
             /** Text Key */
             text_key: string;
+        };
+        /**
+         * LossesDoc
+         * @description What an export would lose, counted before it is made.
+         */
+        LossesDoc: {
+            /** Losses */
+            losses: components["schemas"]["LossDoc"][];
+        };
+        /**
+         * MarkIn
+         * @description An annotation: a point where both times are the same. ``colour`` like ``#ffcc00``, or empty.
+         * @example {
+         *       "colour": "#ffcc00",
+         *       "from_ns": 1750000020000000000,
+         *       "severity": "warning",
+         *       "text": "brake closes late",
+         *       "to_ns": 1750000020500000000
+         *     }
+         */
+        MarkIn: {
+            /**
+             * Colour
+             * @default
+             */
+            colour: string;
+            /** From Ns */
+            from_ns: number;
+            /** Incident */
+            incident?: string | null;
+            /**
+             * Severity
+             * @default info
+             * @enum {string}
+             */
+            severity: "info" | "warning" | "error";
+            /** Text */
+            text: string;
+            /** To Ns */
+            to_ns: number;
         };
         /**
          * MasterDoc
@@ -3440,6 +5488,112 @@ export interface components {
             sign: string;
             /** T Ns */
             t_ns: number;
+        };
+        /**
+         * MergeFile
+         * @description A recording of a merge: ``offset_ns`` is added to its times, ``buses`` gives some of its buses other names.
+         */
+        MergeFile: {
+            /** Buses */
+            buses?: {
+                [key: string]: string;
+            };
+            /** Name */
+            name: string;
+            /**
+             * Offset Ns
+             * @default 0
+             */
+            offset_ns: number;
+        };
+        /**
+         * MergeRequest
+         * @description Recordings to merge by time.
+         */
+        MergeRequest: {
+            /** Recordings */
+            recordings: components["schemas"]["MergeFile"][];
+        };
+        /**
+         * MomentSet
+         * @description A set that was kept: how many objects were known at that time, and how many were never seen until then.
+         */
+        MomentSet: {
+            /** Device */
+            device: string;
+            /** Id */
+            id: string;
+            /** Known */
+            known: number;
+            /** Unseen */
+            unseen: number;
+        };
+        /**
+         * MomentSetsRequest
+         * @description Keep what was known of ``devices`` at ``t_ns`` as sets; null: at the cursor.
+         */
+        MomentSetsRequest: {
+            /** Devices */
+            devices: string[];
+            /**
+             * Reason
+             * @default
+             */
+            reason: string;
+            /** T Ns */
+            t_ns?: number | null;
+        };
+        /**
+         * MotionLine
+         * @description ``available`` False: nothing is connected that could move, or this is a recording.
+         *
+         *     ``refused``: the page whose wish for the lease was refused last. ``left``: devices where settings still stand that
+         *     were changed for motion, by a server that was killed or a bus that was lost.
+         */
+        MotionLine: {
+            /** Available */
+            available: boolean;
+            ended: components["schemas"]["EndedLine"] | null;
+            holder: components["schemas"]["LeaseLine"] | null;
+            /** Left */
+            left: string[];
+            /** People Out */
+            people_out: boolean;
+            /** Prepared */
+            prepared: components["schemas"]["PreparedLine"][];
+            /** Refused */
+            refused: string | null;
+            /** Rotor Locked */
+            rotor_locked: boolean;
+            running: components["schemas"]["RunningLine"] | null;
+            wish: components["schemas"]["LeaseLine"] | null;
+        };
+        /**
+         * MotionMessage
+         * @description Topic ``motion``: who may move the axes, what is prepared and under way, where it changed.
+         */
+        MotionMessage: {
+            /**
+             * Ctx
+             * @default live
+             */
+            ctx: string;
+            data: components["schemas"]["MotionLine"];
+            /** Seq */
+            seq: number;
+            /** T Ns */
+            t_ns: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            type: "motion";
+            /**
+             * V
+             * @default 1
+             * @constant
+             */
+            v: 1;
         };
         /**
          * MotorChange
@@ -3630,6 +5784,34 @@ export interface components {
             unchanged: components["schemas"]["MotorDoc"][];
         };
         /**
+         * MoveRequest
+         * @description Move the blade to an angle while it is held.
+         * @example {
+         *       "angle_deg": 45,
+         *       "fence": 1764029382123456,
+         *       "order": 3,
+         *       "speed_dps": 2
+         *     }
+         */
+        MoveRequest: {
+            /** Angle Deg */
+            angle_deg: number;
+            /** Fence */
+            fence: number;
+            /** Order */
+            order: number;
+            /** Speed Dps */
+            speed_dps: number;
+        };
+        /**
+         * MovedDoc
+         * @description How it ended; the end of a text key ``motion.ended``.
+         */
+        MovedDoc: {
+            /** Why */
+            why: string;
+        };
+        /**
          * NamelessNode
          * @description A node of a recording with values of which it is not told what it is.
          */
@@ -3673,6 +5855,65 @@ export interface components {
             serial: string;
         };
         /**
+         * NewIncident
+         * @description A new incident on the recording of that name.
+         * @example {
+         *       "at_ns": 1750000020000000000,
+         *       "camera": "blade-2",
+         *       "from_ns": 1750000000000000000,
+         *       "loop": {
+         *         "from_ns": 1750000015000000000,
+         *         "to_ns": 1750000025000000000
+         *       },
+         *       "notes": "Grease on the gear; cleaned.",
+         *       "plots": [
+         *         [
+         *           "wtg-07/blade-2/pmc/6064",
+         *           "wtg-07/blade-2/pmc/60F4"
+         *         ]
+         *       ],
+         *       "recording": "3-following-error.mcap",
+         *       "tags": [
+         *         "8611h"
+         *       ],
+         *       "title": "Blade 2 trips on following error",
+         *       "to_ns": 1750000030000000000
+         *     }
+         */
+        NewIncident: {
+            /** At Ns */
+            at_ns: number;
+            /**
+             * Camera
+             * @default
+             */
+            camera: string;
+            /** From Ns */
+            from_ns: number;
+            loop?: components["schemas"]["LoopRef"] | null;
+            /**
+             * Notes
+             * @default
+             */
+            notes: string;
+            /**
+             * Plots
+             * @default []
+             */
+            plots: string[][];
+            /** Recording */
+            recording: string;
+            /**
+             * Tags
+             * @default []
+             */
+            tags: string[];
+            /** Title */
+            title: string;
+            /** To Ns */
+            to_ns: number;
+        };
+        /**
          * NewUser
          * @description A user to be made. The first one is an expert, whatever role is named.
          */
@@ -3693,6 +5934,20 @@ export interface components {
              * @enum {string}
              */
             role: "viewer" | "technician" | "expert";
+        };
+        /**
+         * NodeAt
+         * @description A node and the frame that told: jump to ``t_ns`` on ``bus``. ``device`` is its slug where it is known.
+         */
+        NodeAt: {
+            /** Bus */
+            bus: string;
+            /** Device */
+            device: string | null;
+            /** Node */
+            node: number;
+            /** T Ns */
+            t_ns: number;
         };
         /**
          * NodeLine
@@ -3725,9 +5980,8 @@ export interface components {
             /**
              * Ctx
              * @default live
-             * @constant
              */
-            ctx: "live";
+            ctx: string;
             /** Data */
             data: components["schemas"]["NodeLine"][];
             /** Seq */
@@ -3747,10 +6001,86 @@ export interface components {
             v: 1;
         };
         /**
+         * NotPart
+         * @description Nowhere in the recording.
+         */
+        "NotPart-Input": {
+            /** Part */
+            part: components["schemas"]["EventPart"] | components["schemas"]["LevelPart"] | components["schemas"]["PairPart-Input"] | components["schemas"]["AllPart-Input"] | components["schemas"]["AnyPart-Input"] | components["schemas"]["NotPart-Input"];
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            type: "not";
+        };
+        /**
+         * NotPart
+         * @description Nowhere in the recording.
+         */
+        "NotPart-Output": {
+            /** Part */
+            part: components["schemas"]["EventPart"] | components["schemas"]["LevelPart"] | components["schemas"]["PairPart-Output"] | components["schemas"]["AllPart-Output"] | components["schemas"]["AnyPart-Output"] | components["schemas"]["NotPart-Output"];
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            type: "not";
+        };
+        /**
          * Nothing
          * @description An empty object: the request needs nothing more.
          */
         Nothing: Record<string, never>;
+        /**
+         * OpenReplayRequest
+         * @description ``recording`` is the name of a file of the list.
+         */
+        OpenReplayRequest: {
+            /** Recording */
+            recording: string;
+        };
+        /**
+         * Order
+         * @description How two things follow each other.
+         * @enum {string}
+         */
+        Order: "before" | "then" | "without";
+        /**
+         * OrderRequest
+         * @description An order to an axis; ``order`` rises with each one of a page, so that an old one does nothing.
+         * @example {
+         *       "fence": 1764029382123456,
+         *       "order": 1
+         *     }
+         */
+        OrderRequest: {
+            /** Fence */
+            fence: number;
+            /** Order */
+            order: number;
+        };
+        /**
+         * OriginDoc
+         * @description Where an incident came from that was made elsewhere.
+         */
+        OriginDoc: {
+            /** Exported Ns */
+            exported_ns: number;
+            /** File */
+            file: string;
+            /** Opened By */
+            opened_by: string;
+            /** Opened Ns */
+            opened_ns: number;
+            /** Person */
+            person: string;
+            /** Recording */
+            recording: string;
+            /** Sha256 */
+            sha256: string;
+            /** Tool */
+            tool: string;
+        };
         /**
          * OwnPassword
          * @description The password of who asks; all their sessions end, this one too.
@@ -3766,6 +6096,44 @@ export interface components {
              * @example correct horse battery
              */
             old: string;
+        };
+        /**
+         * PairPart
+         * @description Two things in an order, within a time.
+         */
+        "PairPart-Input": {
+            /** Left */
+            left: components["schemas"]["EventPart"] | components["schemas"]["LevelPart"] | components["schemas"]["PairPart-Input"] | components["schemas"]["AllPart-Input"] | components["schemas"]["AnyPart-Input"] | components["schemas"]["NotPart-Input"];
+            order: components["schemas"]["Order"];
+            /** Right */
+            right: components["schemas"]["EventPart"] | components["schemas"]["LevelPart"] | components["schemas"]["PairPart-Input"] | components["schemas"]["AllPart-Input"] | components["schemas"]["AnyPart-Input"] | components["schemas"]["NotPart-Input"];
+            same?: components["schemas"]["Same"] | null;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            type: "pair";
+            /** Within Ms */
+            within_ms: number;
+        };
+        /**
+         * PairPart
+         * @description Two things in an order, within a time.
+         */
+        "PairPart-Output": {
+            /** Left */
+            left: components["schemas"]["EventPart"] | components["schemas"]["LevelPart"] | components["schemas"]["PairPart-Output"] | components["schemas"]["AllPart-Output"] | components["schemas"]["AnyPart-Output"] | components["schemas"]["NotPart-Output"];
+            order: components["schemas"]["Order"];
+            /** Right */
+            right: components["schemas"]["EventPart"] | components["schemas"]["LevelPart"] | components["schemas"]["PairPart-Output"] | components["schemas"]["AllPart-Output"] | components["schemas"]["AnyPart-Output"] | components["schemas"]["NotPart-Output"];
+            same?: components["schemas"]["Same"] | null;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            type: "pair";
+            /** Within Ms */
+            within_ms: number;
         };
         /**
          * ParameterChange
@@ -4054,6 +6422,24 @@ export interface components {
             slow_every: number;
         };
         /**
+         * PreparedDoc
+         * @description The proof: so long after our last heartbeat the axis had stopped by itself.
+         */
+        PreparedDoc: {
+            /** Proof Ms */
+            proof_ms: number;
+        };
+        /**
+         * PreparedLine
+         * @description An axis that may move: so long after our last heartbeat it had stopped by itself.
+         */
+        PreparedLine: {
+            /** Device */
+            device: string;
+            /** Proof Ms */
+            proof_ms: number;
+        };
+        /**
          * PresentVisit
          * @description The visit that is open, or null.
          */
@@ -4106,6 +6492,12 @@ export interface components {
             /** Addresses */
             addresses?: string[] | null;
         };
+        /**
+         * Reason
+         * @description Why one follows from the other.
+         * @enum {string}
+         */
+        Reason: "same_event" | "mains" | "hold_up" | "battery_load" | "no_voltage" | "window_time" | "fault_opens" | "chain" | "restart_opens" | "unit_missed" | "partner_silent" | "command" | "efc_rules" | "drives_to_feather" | "fault_pending" | "power_down" | "off_the_bus";
         /**
          * RecordingDoc
          * @description What one file holds beside its frames.
@@ -4176,6 +6568,8 @@ export interface components {
         /**
          * RecordingRef
          * @description One file. ``unread``: it was not looked into yet, ask again; ``reason`` says why it cannot be read.
+         *
+         *     ``sample``: it came with the program.
          */
         RecordingRef: {
             /** Modified Ns */
@@ -4184,6 +6578,11 @@ export interface components {
             name: string;
             /** Reason */
             reason: string | null;
+            /**
+             * Sample
+             * @default false
+             */
+            sample: boolean;
             /** Size Bytes */
             size_bytes: number;
             /**
@@ -4192,6 +6591,25 @@ export interface components {
              */
             state: "live" | "finished" | "unfinished" | "unreadable" | "unread";
             summary: components["schemas"]["RecordingSummary"] | null;
+        };
+        /**
+         * RecordingSearchRequest
+         * @description What is looked for, and in which recordings of the list; null: in all.
+         *
+         *     ``make_indexes``: recordings that have no index get one first, which can take minutes each.
+         */
+        RecordingSearchRequest: {
+            /**
+             * Make Indexes
+             * @default false
+             */
+            make_indexes: boolean;
+            /** Query */
+            query?: (components["schemas"]["EventPart"] | components["schemas"]["LevelPart"] | components["schemas"]["PairPart-Input"] | components["schemas"]["AllPart-Input"] | components["schemas"]["AnyPart-Input"] | components["schemas"]["NotPart-Input"]) | null;
+            /** Recordings */
+            recordings?: string[] | null;
+            /** Text */
+            text?: string | null;
         };
         /**
          * RecordingSummary
@@ -4243,6 +6661,49 @@ export interface components {
             nameless: components["schemas"]["NamelessNode"][];
             /** Sets */
             sets: components["schemas"]["RecoveredSet"][];
+        };
+        /**
+         * Remark
+         * @description Something to tell of what was made: ``text_key`` with ``details`` is its text.
+         */
+        Remark: {
+            /** Count */
+            count: number;
+            /** Details */
+            details: {
+                [key: string]: unknown;
+            };
+            /** Text Key */
+            text_key: string;
+            /** What */
+            what: string;
+        };
+        /**
+         * ReplayDoc
+         * @description An open replay. ``id`` names its context ``replay/<id>``; ``damages`` are places that could not be read.
+         *
+         *     Steps from event to event, plots and the timeline know the whole recording once its ``index`` is ready.
+         *     ``watchers`` are the pages that look at it.
+         */
+        ReplayDoc: {
+            cursor: components["schemas"]["CursorLine"];
+            /** Damages */
+            damages: number;
+            /** From Ns */
+            from_ns: number;
+            /** Id */
+            id: string;
+            index: components["schemas"]["IndexLine"];
+            /** Name */
+            name: string;
+            /** Recording */
+            recording: string;
+            /** To Ns */
+            to_ns: number;
+            /** Turbine */
+            turbine: string;
+            /** Watchers */
+            watchers: number;
         };
         /**
          * RestartDone
@@ -4676,6 +7137,12 @@ export interface components {
             written: ("wanted" | "before") | null;
         };
         /**
+         * Role
+         * @description What a step is to its trip.
+         * @enum {string}
+         */
+        Role: "before" | "first" | "path" | "trip" | "consequence" | "own";
+        /**
          * RotorLine
          * @description Rotor and wind as a twin told them last, at ``t_ns``; all None where nobody tells them.
          *
@@ -4704,9 +7171,8 @@ export interface components {
             /**
              * Ctx
              * @default live
-             * @constant
              */
-            ctx: "live";
+            ctx: string;
             data: components["schemas"]["RotorLine"];
             /** Seq */
             seq: number;
@@ -4826,6 +7292,22 @@ export interface components {
             stations: components["schemas"]["StationFindings"][];
         };
         /**
+         * RunningLine
+         * @description What is under way; ``doing`` is the end of a text key.
+         */
+        RunningLine: {
+            /** Device */
+            device: string;
+            /** Doing */
+            doing: string;
+        };
+        /**
+         * Same
+         * @description What both sides of a pair must have in common.
+         * @enum {string}
+         */
+        Same: "node" | "blade";
+        /**
          * SaveDone
          * @description The device acknowledged the save.
          */
@@ -4883,6 +7365,20 @@ export interface components {
             seed: number;
             /** Title */
             title: string;
+        };
+        /**
+         * ScopeDoc
+         * @description Where: null means anywhere. ``device`` is the last part of a slug: pmm, pmc.
+         */
+        ScopeDoc: {
+            /** Blade */
+            blade?: number | null;
+            /** Bus */
+            bus?: string | null;
+            /** Device */
+            device?: string | null;
+            /** Node */
+            node?: number | null;
         };
         /**
          * SdoLine
@@ -4964,7 +7460,32 @@ export interface components {
             /** T Ns */
             t_ns: number;
         };
-        ServerMessage: components["schemas"]["HelloMessage"] | components["schemas"]["BenchMessage"] | components["schemas"]["HeartbeatMessage"] | components["schemas"]["LinkMessage"] | components["schemas"]["NodesMessage"] | components["schemas"]["AxesMessage"] | components["schemas"]["RotorMessage"] | components["schemas"]["InstructorMessage"] | components["schemas"]["ValuesMessage"] | components["schemas"]["EventMessage"] | components["schemas"]["TraceMessage"];
+        /**
+         * SeriesLine
+         * @description A signal over time. None is a break: from there nothing is known.
+         *
+         *     ``exact``: every value, with ``low`` the same as ``high``; else the least and greatest of each bucket of
+         *     ``bucket_s``, which begins at ``t_s``.
+         */
+        SeriesLine: {
+            /** Address */
+            address: string;
+            /** Bucket S */
+            bucket_s: number;
+            /** Device */
+            device: string;
+            /** Exact */
+            exact: boolean;
+            /** High */
+            high: (number | null)[];
+            /** Low */
+            low: (number | null)[];
+            /** T S */
+            t_s: number[];
+            /** Unit */
+            unit: string;
+        };
+        ServerMessage: components["schemas"]["HelloMessage"] | components["schemas"]["BenchMessage"] | components["schemas"]["HeartbeatMessage"] | components["schemas"]["LinkMessage"] | components["schemas"]["NodesMessage"] | components["schemas"]["AxesMessage"] | components["schemas"]["RotorMessage"] | components["schemas"]["InstructorMessage"] | components["schemas"]["MotionMessage"] | components["schemas"]["ValuesMessage"] | components["schemas"]["EventMessage"] | components["schemas"]["TraceMessage"] | components["schemas"]["CursorMessage"] | components["schemas"]["GoneMessage"];
         /**
          * Session
          * @description Who is served, and in which languages. ``user`` is null where a launch token opened the session.
@@ -5196,6 +7717,18 @@ export interface components {
             total: number;
         };
         /**
+         * Severity
+         * @description How much it matters.
+         * @enum {string}
+         */
+        Severity: "info" | "warning" | "error";
+        /**
+         * Shape
+         * @description How the table is laid out.
+         * @enum {string}
+         */
+        Shape: "long" | "wide";
+        /**
          * SideDoc
          * @description One side of a comparison: a version of a motor, or what a device was last seen to hold (``motor`` null).
          */
@@ -5203,6 +7736,116 @@ export interface components {
             /** Device */
             device: string | null;
             motor: components["schemas"]["MotorDoc"] | null;
+        };
+        /**
+         * SignKind
+         * @description What it is. The values are the words of the search language, so they stay as they are.
+         * @enum {string}
+         */
+        SignKind: "emcy" | "emcy_reset" | "error_code" | "boot_up" | "nmt_command" | "write_aborted" | "parameter_written" | "gap" | "axis_fault" | "axis_warning" | "axis_enabled" | "quick_stop" | "remote_lost" | "internal_limit" | "following_error" | "efc_command" | "efc_input" | "enable_input" | "limit_switch" | "feather_switch" | "watchdog_open" | "chain_open" | "relay_open" | "pmm_fault" | "pmm_warning" | "battery_fault" | "battery_test" | "on_battery" | "mains_high" | "mains_phase" | "mains_low" | "booster" | "hold_up_over" | "device_status" | "limit" | "silent" | "not_operational";
+        /**
+         * SignalLine
+         * @description One object of a device that is a number, as it was seen in the recording.
+         *
+         *     ``low`` and ``high`` are in ``unit``; ``states`` are text keys of an enumeration's values, None where it has none.
+         *     ``changes`` counts the values that differed from the one before.
+         */
+        SignalLine: {
+            /** Address */
+            address: string;
+            /** Changes */
+            changes: number;
+            /** Count */
+            count: number;
+            /** Device */
+            device: string;
+            /** First S */
+            first_s: number;
+            /** High */
+            high: number;
+            /** Last S */
+            last_s: number;
+            /** Low */
+            low: number;
+            /** Name */
+            name: string;
+            /** States */
+            states: {
+                [key: string]: string;
+            } | null;
+            /** Sub */
+            sub: string | null;
+            /** Unit */
+            unit: string;
+        };
+        /**
+         * SignalWanted
+         * @description An object such as ``6064``, on one blade or all, of ``pmm``, ``pmc`` or both; or of exactly one node of a bus.
+         */
+        SignalWanted: {
+            /** Address */
+            address: string;
+            /** Blade */
+            blade?: number | null;
+            /** Bus */
+            bus?: string | null;
+            /** Device */
+            device?: string | null;
+            /** Node */
+            node?: number | null;
+        };
+        /**
+         * SignatureDoc
+         * @description A signature as it was understood, in both forms.
+         */
+        SignatureDoc: {
+            /** Query */
+            query: components["schemas"]["EventPart"] | components["schemas"]["LevelPart"] | components["schemas"]["PairPart-Output"] | components["schemas"]["AllPart-Output"] | components["schemas"]["AnyPart-Output"] | components["schemas"]["NotPart-Output"];
+            /** Text */
+            text: string;
+        };
+        /**
+         * SignatureRequest
+         * @description A signature, as text or as JSON; exactly one of them.
+         */
+        SignatureRequest: {
+            /** Query */
+            query?: (components["schemas"]["EventPart"] | components["schemas"]["LevelPart"] | components["schemas"]["PairPart-Input"] | components["schemas"]["AllPart-Input"] | components["schemas"]["AnyPart-Input"] | components["schemas"]["NotPart-Input"]) | null;
+            /** Text */
+            text?: string | null;
+        };
+        /**
+         * SignatureSearchDoc
+         * @description A search as it stands: ``done`` of ``total`` recordings.
+         *
+         *     ``hits`` are those from the place ``since`` on that was asked for; ask again with ``hits_total``. ``more``: there
+         *     were more hits than are kept.
+         */
+        SignatureSearchDoc: {
+            /** Details */
+            details: {
+                [key: string]: unknown;
+            };
+            /** Done */
+            done: number;
+            /** Hits */
+            hits: components["schemas"]["HitDoc"][];
+            /** Hits Total */
+            hits_total: number;
+            /** Id */
+            id: string;
+            /** More */
+            more: boolean;
+            /** Searched */
+            searched: number;
+            signature: components["schemas"]["SignatureDoc"];
+            /** Skipped */
+            skipped: components["schemas"]["SkippedDoc"][];
+            state: components["schemas"]["JobState"];
+            /** Text Key */
+            text_key: string | null;
+            /** Total */
+            total: number;
         };
         /**
          * SiteDeviceDoc
@@ -5296,6 +7939,39 @@ export interface components {
             stations: components["schemas"]["SiteStationDoc"][];
         };
         /**
+         * SkippedDoc
+         * @description A recording that was not looked into; ``text_key`` and ``details`` are of what went wrong, where anything did.
+         */
+        SkippedDoc: {
+            /** Details */
+            details: {
+                [key: string]: unknown;
+            };
+            /** Name */
+            name: string;
+            reason: components["schemas"]["Unsearched"];
+            /** Reason Key */
+            reason_key: string;
+            /** Text Key */
+            text_key: string | null;
+        };
+        /**
+         * SkippedLine
+         * @description A line of an imported file that was left out.
+         */
+        SkippedLine: {
+            /** Line */
+            line: number;
+            /** Text */
+            text: string;
+        };
+        /**
+         * Special
+         * @description Events that are no single sign.
+         * @enum {string}
+         */
+        Special: "trip" | "error" | "warning";
+        /**
          * StationFindings
          * @description One station: the devices that were judged together, and the findings, the gravest first.
          */
@@ -5341,6 +8017,28 @@ export interface components {
              * @enum {string}
              */
             state: "proven" | "saved";
+        };
+        /**
+         * Subscribe
+         * @description What the page wants to hear of a context; replaces what it wanted before of it.
+         *
+         *     ``trace`` is the filter of the topic ``trace``.
+         */
+        Subscribe: {
+            /**
+             * Ctx
+             * @default live
+             */
+            ctx: string;
+            /** Topics */
+            topics: string[];
+            /** @default null */
+            trace: components["schemas"]["TraceFilter"] | null;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            type: "subscribe";
         };
         /**
          * SummaryDoc
@@ -5404,6 +8102,28 @@ export interface components {
              * @default false
              */
             sure: boolean;
+        };
+        /**
+         * Timeline
+         * @description From ``from_ns`` to ``to_ns``: load in buckets of ``bucket_ns``, gaps, and the events that matter most.
+         *
+         *     ``left_out`` counts the events for which there is no room.
+         */
+        Timeline: {
+            /** Bucket Ns */
+            bucket_ns: number;
+            /** From Ns */
+            from_ns: number;
+            /** Gaps */
+            gaps: components["schemas"]["GapLine"][];
+            /** Left Out */
+            left_out: number;
+            /** Load */
+            load: components["schemas"]["LoadLine"][];
+            /** Marks */
+            marks: components["schemas"]["EventLine"][];
+            /** To Ns */
+            to_ns: number;
         };
         /**
          * TraceBatch
@@ -5574,9 +8294,8 @@ export interface components {
             /**
              * Ctx
              * @default live
-             * @constant
              */
-            ctx: "live";
+            ctx: string;
             data: components["schemas"]["TraceBatch"];
             /** Seq */
             seq: number;
@@ -5630,6 +8349,125 @@ export interface components {
             to_t_ns: number | null;
         };
         /**
+         * TrackDoc
+         * @description One signal of one recording, scaled, in ``unit``; times in ms from the zero.
+         *
+         *     ``exact``: values as they came (``low`` equals ``high``); else least and greatest of a stretch of ``step_ms`` from
+         *     each time on. No line may cross ``breaks_ms``.
+         */
+        TrackDoc: {
+            /** Address */
+            address: string;
+            /** Blade */
+            blade: number | null;
+            /** Breaks Ms */
+            breaks_ms: number[];
+            /** Bus */
+            bus: string;
+            /** Device */
+            device: string | null;
+            /** Exact */
+            exact: boolean;
+            /** High */
+            high: number[];
+            /** Low */
+            low: number[];
+            /** Name */
+            name: string;
+            /** Node */
+            node: number;
+            /** Step Ms */
+            step_ms: number;
+            /** T Ms */
+            t_ms: number[];
+            /** Unit */
+            unit: string;
+        };
+        /**
+         * TripDoc
+         * @description One trip. ``t0_ns`` is the moment at which the safety chain opened or an axis faulted.
+         *
+         *     ``first``, ``trigger`` and ``at`` are places in ``steps``: what came first of all, the last fault, command or loss
+         *     before T0, and the step at T0. ``known`` false: nothing on the bus tells why. ``ended_ns`` null: it lasts to the
+         *     end of the recording. ``headline`` is the trip in one sentence. ``already`` tells which units were tripped before
+         *     the recording began, and were so at T0; null where none was.
+         */
+        TripDoc: {
+            already: components["schemas"]["WordsDoc"] | null;
+            /** At */
+            at: number;
+            /** Ended Ns */
+            ended_ns: number | null;
+            /** First */
+            first: number;
+            headline: components["schemas"]["WordsDoc"];
+            /** Known */
+            known: boolean;
+            /** Number */
+            number: number;
+            /** Steps */
+            steps: components["schemas"]["TripStepDoc"][];
+            /** T0 Ns */
+            t0_ns: number;
+            /** Trigger */
+            trigger: number;
+        };
+        /**
+         * TripStepDoc
+         * @description One step of a trip: like signs of one or several nodes (``at``, in the order of time).
+         *
+         *     ``dt_ms`` counts from what came first, ``t0_ms`` from T0. ``says`` is who and what, with the time behind the first
+         *     (``sentence``). ``because`` is the place of the step that explains it, ``reason`` why, ``because_words`` both in a
+         *     sentence that names what stands behind the contacts in between. ``since_ns``: it may have begun as early as then.
+         *     ``standing``: it was so when it was first seen. ``times``: how often it came while it chattered.
+         */
+        TripStepDoc: {
+            /** At */
+            at: components["schemas"]["NodeAt"][];
+            /** Because */
+            because: number | null;
+            because_words: components["schemas"]["WordsDoc"] | null;
+            /** Details */
+            details: {
+                [key: string]: unknown;
+            };
+            /** Dt Ms */
+            dt_ms: number;
+            kind: components["schemas"]["SignKind"];
+            reason: components["schemas"]["Reason"] | null;
+            role: components["schemas"]["Role"];
+            says: components["schemas"]["WordsDoc"];
+            sentence: components["schemas"]["WordsDoc"];
+            severity: components["schemas"]["Severity"];
+            /** Since Ns */
+            since_ns: number | null;
+            /** Standing */
+            standing: boolean;
+            /** T0 Ms */
+            t0_ms: number;
+            /** T Ns */
+            t_ns: number;
+            /** Times */
+            times: number;
+        };
+        /**
+         * TripsDoc
+         * @description The trips of a recording, by time. ``already`` tells which units were tripped when it began; null: none.
+         */
+        TripsDoc: {
+            already: components["schemas"]["WordsDoc"] | null;
+            /** From Ns */
+            from_ns: number;
+            /** Name */
+            name: string;
+            /** To Ns */
+            to_ns: number;
+            /** Trips */
+            trips: components["schemas"]["TripDoc"][];
+            /** Turbine */
+            turbine: string;
+        };
+        /**
          * Turbine
          * @description The connected turbine.
          */
@@ -5639,7 +8477,7 @@ export interface components {
              * Mode
              * @enum {string}
              */
-            mode: "live" | "twin" | "none";
+            mode: "live" | "twin" | "none" | "replay";
             /** Name */
             name: string;
             /** Slug */
@@ -5685,6 +8523,12 @@ export interface components {
              */
             side: "then" | "now";
         };
+        /**
+         * Unsearched
+         * @description Why a recording was not looked into.
+         * @enum {string}
+         */
+        Unsearched: "no_index" | "broken" | "live" | "not_fitting";
         /**
          * UserChange
          * @description What is to change; null stays as it is. Another password or ``disabled`` ends the user's sessions.
@@ -5778,9 +8622,8 @@ export interface components {
             /**
              * Ctx
              * @default live
-             * @constant
              */
-            ctx: "live";
+            ctx: string;
             data: components["schemas"]["ValuesData"];
             /** Seq */
             seq: number;
@@ -5860,6 +8703,16 @@ export interface components {
             started_ns: number;
         };
         /**
+         * WordsDoc
+         * @description A sentence in every language.
+         */
+        WordsDoc: {
+            /** De */
+            de: string;
+            /** En */
+            en: string;
+        };
+        /**
          * WriteDone
          * @description A write that was verified, or whose description proves it by other means (``verified`` false).
          */
@@ -5926,6 +8779,230 @@ export interface components {
 }
 export type $defs = Record<string, never>;
 export interface operations {
+    align_recordings: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "after_ms": 15000,
+                 *       "before_ms": 5000,
+                 *       "recordings": [
+                 *         {
+                 *           "name": "3-following-error.mcap",
+                 *           "trip": 0
+                 *         },
+                 *         {
+                 *           "name": "5-bloc-ageing.mcap",
+                 *           "t_ns": 1772449260945239600
+                 *         }
+                 *       ],
+                 *       "signals": [
+                 *         {
+                 *           "address": "6064",
+                 *           "device": "pmc"
+                 *         },
+                 *         {
+                 *           "address": "60F4",
+                 *           "blade": 2
+                 *         }
+                 *       ]
+                 *     }
+                 */
+                "application/json": components["schemas"]["AlignRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["AlignDoc"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    change_annotation: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                annotation_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "colour": "#ffcc00",
+                 *       "from_ns": 1750000020000000000,
+                 *       "severity": "warning",
+                 *       "text": "brake closes late",
+                 *       "to_ns": 1750000020500000000
+                 *     }
+                 */
+                "application/json": components["schemas"]["MarkIn"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["AnnotationDoc"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    remove_annotation: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                annotation_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Nothing"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
     audit_rows: {
         parameters: {
             query?: {
@@ -6297,6 +9374,123 @@ export interface operations {
             };
         };
     };
+    desk_views: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["DeskViews"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    put_desk_views: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "views": [
+                 *         {
+                 *           "name": "mains",
+                 *           "plots": "blade-1/pmm/3062,blade-2/pmm/3062;blade-1/pmm/3063"
+                 *         }
+                 *       ]
+                 *     }
+                 */
+                "application/json": components["schemas"]["DeskViews"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["DeskViews"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
     favourites: {
         parameters: {
             query?: never;
@@ -6482,6 +9676,616 @@ export interface operations {
             };
             /** @description Unprocessable Entity */
             422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    incidents: {
+        parameters: {
+            query?: {
+                recording?: string | null;
+                tag?: string | null;
+                words?: string;
+                hidden?: boolean;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["IncidentDoc"][];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    add_incident: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "at_ns": 1750000020000000000,
+                 *       "camera": "blade-2",
+                 *       "from_ns": 1750000000000000000,
+                 *       "loop": {
+                 *         "from_ns": 1750000015000000000,
+                 *         "to_ns": 1750000025000000000
+                 *       },
+                 *       "notes": "Grease on the gear; cleaned.",
+                 *       "plots": [
+                 *         [
+                 *           "wtg-07/blade-2/pmc/6064",
+                 *           "wtg-07/blade-2/pmc/60F4"
+                 *         ]
+                 *       ],
+                 *       "recording": "3-following-error.mcap",
+                 *       "tags": [
+                 *         "8611h"
+                 *       ],
+                 *       "title": "Blade 2 trips on following error",
+                 *       "to_ns": 1750000030000000000
+                 *     }
+                 */
+                "application/json": components["schemas"]["NewIncident"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["IncidentDoc"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    import_incident: {
+        parameters: {
+            query: {
+                name: string;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/octet-stream": string;
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["IncidentTaken"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    incident: {
+        parameters: {
+            query?: {
+                version?: number | null;
+            };
+            header?: never;
+            path: {
+                key: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["IncidentDoc"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    change_incident: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                key: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "at_ns": 1750000020000000000,
+                 *       "based_on": 1,
+                 *       "camera": "blade-2",
+                 *       "from_ns": 1750000000000000000,
+                 *       "loop": {
+                 *         "from_ns": 1750000015000000000,
+                 *         "to_ns": 1750000025000000000
+                 *       },
+                 *       "notes": "Grease on the gear; cleaned.",
+                 *       "plots": [
+                 *         [
+                 *           "wtg-07/blade-2/pmc/6064",
+                 *           "wtg-07/blade-2/pmc/60F4"
+                 *         ]
+                 *       ],
+                 *       "tags": [
+                 *         "8611h"
+                 *       ],
+                 *       "title": "Blade 2 trips on following error",
+                 *       "to_ns": 1750000030000000000
+                 *     }
+                 */
+                "application/json": components["schemas"]["IncidentChange"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["IncidentDoc"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    hide_incident: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                key: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Nothing"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    export_incident: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                key: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    incident_report: {
+        parameters: {
+            query?: {
+                language?: ("en" | "de") | null;
+            };
+            header?: never;
+            path: {
+                key: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    incident_versions: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                key: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["IncidentDoc"][];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -7195,15 +10999,6 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Conflict */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["Problem"];
-                };
-            };
             /** @description Unprocessable Entity */
             422: {
                 headers: {
@@ -7260,15 +11055,6 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Conflict */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["Problem"];
-                };
-            };
             /** @description Anything else that went wrong */
             default: {
                 headers: {
@@ -7309,15 +11095,6 @@ export interface operations {
             };
             /** @description Forbidden */
             403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["Problem"];
-                };
-            };
-            /** @description Conflict */
-            409: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -7372,15 +11149,6 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Conflict */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["Problem"];
-                };
-            };
             /** @description Anything else that went wrong */
             default: {
                 headers: {
@@ -7425,15 +11193,6 @@ export interface operations {
             };
             /** @description Forbidden */
             403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["Problem"];
-                };
-            };
-            /** @description Conflict */
-            409: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -7692,15 +11451,6 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Conflict */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["Problem"];
-                };
-            };
             /** @description Anything else that went wrong */
             default: {
                 headers: {
@@ -7734,6 +11484,796 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["ParameterChanges"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Conflict */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Bad Gateway */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Service Unavailable */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Gateway Timeout */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    home: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                turbine: string;
+                station: string;
+                device: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "angle_deg": 90,
+                 *       "fence": 1764029382123456,
+                 *       "order": 4
+                 *     }
+                 */
+                "application/json": components["schemas"]["HomeRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["MovedDoc"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Conflict */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Bad Gateway */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Service Unavailable */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Gateway Timeout */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    interlocks: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                turbine: string;
+                station: string;
+                device: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["InterlockDoc"][];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Conflict */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Bad Gateway */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Service Unavailable */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Gateway Timeout */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    jog: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                turbine: string;
+                station: string;
+                device: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "fence": 1764029382123456,
+                 *       "order": 2,
+                 *       "speed_dps": -2
+                 *     }
+                 */
+                "application/json": components["schemas"]["JogRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["MovedDoc"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Conflict */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Bad Gateway */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Service Unavailable */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Gateway Timeout */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    move: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                turbine: string;
+                station: string;
+                device: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "angle_deg": 45,
+                 *       "fence": 1764029382123456,
+                 *       "order": 3,
+                 *       "speed_dps": 2
+                 *     }
+                 */
+                "application/json": components["schemas"]["MoveRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["MovedDoc"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Conflict */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Bad Gateway */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Service Unavailable */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Gateway Timeout */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    prepare: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                turbine: string;
+                station: string;
+                device: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "fence": 1764029382123456,
+                 *       "order": 1
+                 *     }
+                 */
+                "application/json": components["schemas"]["OrderRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["PreparedDoc"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Conflict */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Bad Gateway */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Service Unavailable */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Gateway Timeout */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    put_back: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                turbine: string;
+                station: string;
+                device: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "fence": 1764029382123456,
+                 *       "order": 1
+                 *     }
+                 */
+                "application/json": components["schemas"]["OrderRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["MotionLine"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Conflict */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Bad Gateway */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Service Unavailable */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Gateway Timeout */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    reset: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                turbine: string;
+                station: string;
+                device: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "fence": 1764029382123456,
+                 *       "order": 1
+                 *     }
+                 */
+                "application/json": components["schemas"]["OrderRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["MovedDoc"];
                 };
             };
             /** @description Unauthorized */
@@ -8583,15 +13123,6 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Conflict */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["Problem"];
-                };
-            };
             /** @description Unprocessable Entity */
             422: {
                 headers: {
@@ -8710,6 +13241,446 @@ export interface operations {
             };
             /** @description Not Found */
             404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    motion: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["MotionLine"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    confirm: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "fence": 1764029382123456,
+                 *       "people_out": true,
+                 *       "rotor_locked": true
+                 *     }
+                 */
+                "application/json": components["schemas"]["ConfirmRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["MotionLine"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    take_lease: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "page": "5f2c1d"
+                 *     }
+                 */
+                "application/json": components["schemas"]["LeaseRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["LeaseDoc"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    answer_wish: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "fence": 1764029382123456,
+                 *       "hand_over": true
+                 *     }
+                 */
+                "application/json": components["schemas"]["AnswerRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["MotionLine"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    ask_for_lease: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "page": "5f2c1d"
+                 *     }
+                 */
+                "application/json": components["schemas"]["LeaseRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["LeaseDoc"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    give_back_lease: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "fence": 1764029382123456
+                 *     }
+                 */
+                "application/json": components["schemas"]["FenceRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["MotionLine"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    withdraw_wish: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "page": "5f2c1d"
+                 *     }
+                 */
+                "application/json": components["schemas"]["LeaseRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["MotionLine"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -10791,6 +15762,270 @@ export interface operations {
             };
         };
     };
+    import_recording: {
+        parameters: {
+            query: {
+                /** @description What the file is called */
+                file: string;
+                /** @description Where the file does not tell */
+                format?: components["schemas"]["Format"] | null;
+                /** @description A turbine of the site file */
+                turbine?: string | null;
+                /** @description When the first frame came */
+                start?: string | null;
+                /** @description Leave bad lines out and count them */
+                lenient?: boolean;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** @description The file itself; at most 4 GiB */
+        requestBody: {
+            content: {
+                "application/octet-stream": string;
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ExchangeJob"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    exchange_job: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                job_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ExchangeJob"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    cancel_exchange: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                job_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ExchangeJob"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    merge_recordings: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "recordings": [
+                 *         {
+                 *           "name": "3-following-error.mcap"
+                 *         },
+                 *         {
+                 *           "buses": {
+                 *             "can0": "can1"
+                 *           },
+                 *           "name": "5-bloc-ageing.mcap",
+                 *           "offset_ns": 3600000000000
+                 *         }
+                 *       ]
+                 *     }
+                 */
+                "application/json": components["schemas"]["MergeRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ExchangeJob"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
     recording: {
         parameters: {
             query?: never;
@@ -10849,6 +16084,226 @@ export interface operations {
             };
         };
     };
+    list_annotations: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                name: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["AnnotationList"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    annotate: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                name: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "colour": "#ffcc00",
+                 *       "from_ns": 1750000020000000000,
+                 *       "severity": "warning",
+                 *       "text": "brake closes late",
+                 *       "to_ns": 1750000020500000000
+                 *     }
+                 */
+                "application/json": components["schemas"]["MarkIn"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["AnnotationDoc"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    anonymise_recording: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                name: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "hide_times": true,
+                 *       "objects": [
+                 *         "2105:01"
+                 *       ],
+                 *       "words": [
+                 *         "wtg-07"
+                 *       ]
+                 *     }
+                 */
+                "application/json": components["schemas"]["AnonymiseRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ExchangeJob"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
     download_attachment: {
         parameters: {
             query: {
@@ -10868,6 +16323,86 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content?: never;
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    cut_recording: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                name: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "buses": [
+                 *         "can0"
+                 *       ],
+                 *       "end_ns": 1772449250000000000,
+                 *       "start_ns": 1772449240000000000
+                 *     }
+                 */
+                "application/json": components["schemas"]["CutRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ExchangeJob"];
+                };
             };
             /** @description Unauthorized */
             401: {
@@ -10972,6 +16507,215 @@ export interface operations {
             };
         };
     };
+    export_recording: {
+        parameters: {
+            query: {
+                format: components["schemas"]["Format"];
+                /** @description Nine decimals, directions, raw DLC: loses nothing, fewer tools read it */
+                exact?: boolean;
+                /** @description All where none is given */
+                bus?: string[] | null;
+                /** @description ns since 1970; without it from begin or to end */
+                start_ns?: number | null;
+                /** @description ns since 1970; without it from begin or to end */
+                end_ns?: number | null;
+            };
+            header?: never;
+            path: {
+                name: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    recording_key_events: {
+        parameters: {
+            query?: {
+                /** @description A time stamp in ns */
+                after?: number | null;
+                /** @description A time stamp in ns */
+                before?: number | null;
+                /** @description All where none is given */
+                kind?: components["schemas"]["KeyKind"][] | null;
+                limit?: number;
+            };
+            header?: never;
+            path: {
+                name: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["KeyEventDoc"][];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    export_losses: {
+        parameters: {
+            query: {
+                format: components["schemas"]["Format"];
+                /** @description Nine decimals, directions, raw DLC: loses nothing, fewer tools read it */
+                exact?: boolean;
+                /** @description All where none is given */
+                bus?: string[] | null;
+                /** @description ns since 1970; without it from begin or to end */
+                start_ns?: number | null;
+                /** @description ns since 1970; without it from begin or to end */
+                end_ns?: number | null;
+            };
+            header?: never;
+            path: {
+                name: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["LossesDoc"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
     recover: {
         parameters: {
             query?: never;
@@ -10990,6 +16734,137 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["RecoveredSets"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    export_table: {
+        parameters: {
+            query?: {
+                shape?: components["schemas"]["Shape"];
+                /** @description DEVICE:ADDRESS; all where none is given */
+                signal?: string[] | null;
+                /** @description ns since 1970; without it from begin or to end */
+                start_ns?: number | null;
+                /** @description ns since 1970; without it from begin or to end */
+                end_ns?: number | null;
+            };
+            header?: never;
+            path: {
+                name: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    recording_trips: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                name: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["TripsDoc"];
                 };
             };
             /** @description Unauthorized */
@@ -11079,6 +16954,1263 @@ export interface operations {
             };
             /** @description Unprocessable Entity */
             422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    replays: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ReplayDoc"][];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    open_replay: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "recording": "3-following-error.mcap"
+                 *     }
+                 */
+                "application/json": components["schemas"]["OpenReplayRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ReplayDoc"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    replay: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                replay_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ReplayDoc"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    end_replay: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                replay_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Nothing"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    replay_bus_emergencies: {
+        parameters: {
+            query?: {
+                limit?: number;
+            };
+            header?: never;
+            path: {
+                replay_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["EmcyLine"][];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    replay_bus_identifiers: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                replay_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["BusIdentifier"][];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    replay_bus_load: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                replay_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["BusLoadLine"][];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    replay_bus_nodes: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                replay_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["BusNode"][];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    replay_bus_transfers: {
+        parameters: {
+            query?: {
+                which?: "all" | "writes" | "failed";
+                node?: number | null;
+                limit?: number;
+            };
+            header?: never;
+            path: {
+                replay_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SdoLine"][];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    move_cursor: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                replay_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "action": "step",
+                 *       "by": "event",
+                 *       "forward": true
+                 *     }
+                 */
+                "application/json": components["schemas"]["CursorRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["CursorLine"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    replay_description: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                description_id: string;
+                replay_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": {
+                        [key: string]: unknown;
+                    };
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    replay_events: {
+        parameters: {
+            query?: {
+                /** @description A time stamp in ns */
+                from_ns?: number | null;
+                /** @description A time stamp in ns */
+                to_ns?: number | null;
+                /** @description The least */
+                severity?: "info" | "warning" | "error";
+            };
+            header?: never;
+            path: {
+                replay_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["EventLine"][];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    replay_frames: {
+        parameters: {
+            query?: {
+                /** @description A time stamp in ns; exactly one of the three */
+                before?: number | null;
+                /** @description A time stamp in ns; exactly one of the three */
+                after?: number | null;
+                /** @description A time stamp in ns; exactly one of the three */
+                around?: number | null;
+                limit?: number;
+                /** @description Node numbers, separated by commas */
+                nodes?: string;
+                /** @description Services, separated by commas */
+                services?: string;
+                buses?: string;
+                direction?: ("rx" | "tx") | null;
+                ids?: string;
+                data?: string;
+                q?: string;
+                errors?: boolean;
+                /** @description A time stamp in ns; exactly one of the three */
+                from_t_ns?: number | null;
+                /** @description A time stamp in ns; exactly one of the three */
+                to_t_ns?: number | null;
+            };
+            header?: never;
+            path: {
+                replay_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["TracePage"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    replay_history: {
+        parameters: {
+            query: {
+                device: string;
+                address: string;
+            };
+            header?: never;
+            path: {
+                replay_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ChangeLine"][];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    replay_series: {
+        parameters: {
+            query: {
+                /** @description <device>/<address>, each */
+                signal: string[];
+                /** @description A time stamp in ns */
+                from_ns?: number | null;
+                /** @description A time stamp in ns */
+                to_ns?: number | null;
+                points?: number;
+            };
+            header?: never;
+            path: {
+                replay_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SeriesLine"][];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    keep_moment: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                replay_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "devices": [
+                 *         "wtg-07/blade-2/pmc"
+                 *       ],
+                 *       "reason": "before the trip"
+                 *     }
+                 */
+                "application/json": components["schemas"]["MomentSetsRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["MomentSet"][];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    replay_signals: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                replay_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SignalLine"][];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    replay_timeline: {
+        parameters: {
+            query?: {
+                /** @description A time stamp in ns */
+                from_ns?: number | null;
+                /** @description A time stamp in ns */
+                to_ns?: number | null;
+                buckets?: number;
+            };
+            header?: never;
+            path: {
+                replay_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Timeline"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    replay_turbine: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                replay_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Turbine"] | null;
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -11196,6 +18328,283 @@ export interface operations {
             };
             /** @description Unprocessable Entity */
             422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    search_recordings: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "query": {
+                 *         "left": {
+                 *           "comparison": ">",
+                 *           "number": 2,
+                 *           "object": "60F4",
+                 *           "type": "level",
+                 *           "unit": "°"
+                 *         },
+                 *         "order": "before",
+                 *         "right": {
+                 *           "code": 34321,
+                 *           "kind": "emcy",
+                 *           "type": "event"
+                 *         },
+                 *         "type": "pair",
+                 *         "within_ms": 5000
+                 *       },
+                 *       "recordings": [
+                 *         "3-following-error.mcap"
+                 *       ]
+                 *     }
+                 */
+                "application/json": components["schemas"]["RecordingSearchRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SignatureSearchDoc"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    read_signature: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "text": "60F4 > 2 deg within 5 s before emcy 8611"
+                 *     }
+                 */
+                "application/json": components["schemas"]["SignatureRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SignatureDoc"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    recording_search: {
+        parameters: {
+            query?: {
+                /** @description Hits known already */
+                since?: number;
+            };
+            header?: never;
+            path: {
+                job_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SignatureSearchDoc"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    cancel_recording_search: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                job_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SignatureSearchDoc"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
                 headers: {
                     [name: string]: unknown;
                 };

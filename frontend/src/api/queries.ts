@@ -1,4 +1,6 @@
 import { QueryClient, queryOptions } from "@tanstack/react-query";
+import { baseOf, LIVE } from "../live/channel";
+import { useShown } from "../live/live";
 import { get, Problem } from "./client";
 import type { DescriptionDoc, Job, Language, Session, Turbine } from "./types";
 
@@ -26,17 +28,31 @@ export const textsQuery = (language: Language) =>
     queryFn: ({ signal }) => get<Record<string, string>>(`/api/texts/${language}`, signal),
   });
 
-export const turbineQuery = queryOptions({
-  queryKey: ["turbine"],
-  queryFn: ({ signal }) => get<Turbine | null>("/api/live/turbine", signal),
-  select: (turbine) => turbine ?? undefined,
-});
-
-export const descriptionQuery = (id: string) =>
+const turbineOf = (ctx: string) =>
   queryOptions({
-    queryKey: ["description", id],
-    queryFn: ({ signal }) => get<DescriptionDoc>(`/api/live/descriptions/${id}`, signal),
+    queryKey: ["turbine", ctx],
+    queryFn: ({ signal }) => get<Turbine | null>(`${baseOf(ctx)}/turbine`, signal),
+    select: (turbine) => turbine ?? undefined,
   });
+
+const descriptionOf = (ctx: string, id: string) =>
+  queryOptions({
+    queryKey: ["description", ctx, id],
+    queryFn: ({ signal }) => get<DescriptionDoc>(`${baseOf(ctx)}/descriptions/${id}`, signal),
+  });
+
+/** The turbine that is connected, whatever the page shows. */
+export const turbineQuery = turbineOf(LIVE);
+export const descriptionQuery = (id: string) => descriptionOf(LIVE, id);
+
+/** The turbine that is shown where this is called: the connected one, or that of a recording. */
+export const useTurbineQuery = () => turbineOf(useShown().ctx);
+
+/** How devices are described that are shown where this is called. */
+export function useDescriptionQuery(): typeof descriptionQuery {
+  const { ctx } = useShown();
+  return (id) => descriptionOf(ctx, id);
+}
 
 export const jobQuery = (id: string | null) =>
   queryOptions({

@@ -1,5 +1,7 @@
 /** The trace: its types under the names that the page uses, and how pages and tables are fetched. */
-import { queryOptions } from "@tanstack/react-query";
+import { keepPreviousData, useQuery } from "@tanstack/react-query";
+import { baseOf } from "../live/channel";
+import { useShown, useStanding } from "../live/live";
 import { get } from "./client";
 import type { components } from "./generated";
 
@@ -22,6 +24,7 @@ export type Side = "before" | "after" | "around";
 export const digitsOf = (tNs: number): string => BigInt(tNs).toString();
 
 export function fetchFrames(
+  ctx: string,
   side: Side,
   tNs: number,
   filter: TraceFilter,
@@ -33,25 +36,45 @@ export function fetchFrames(
     const text = Array.isArray(choice) ? choice.join() : String(choice ?? "");
     if (text !== "" && text !== "false") asked.set(name, text);
   }
-  return get<TracePage>(`/api/live/frames?${asked.toString()}`, signal);
+  return get<TracePage>(`${baseOf(ctx)}/frames?${asked.toString()}`, signal);
 }
 
 const FAST_MS = 500;
 const SLOW_MS = 1000;
 
-function table<T>(name: string, path: string, everyMs: number) {
-  return queryOptions({
-    queryKey: ["bus", name, path],
-    queryFn: ({ signal }) => get<T>(path, signal),
-    refetchInterval: everyMs,
+interface Table {
+  name: string;
+  path: string;
+  everyMs: number;
+}
+
+const NODES: Table = { name: "nodes", path: "bus/nodes", everyMs: SLOW_MS };
+const IDENTIFIERS: Table = { name: "ids", path: "bus/identifiers", everyMs: FAST_MS };
+const LOAD: Table = { name: "load", path: "bus/load", everyMs: SLOW_MS };
+const EMERGENCIES: Table = { name: "emcy", path: "bus/emergencies", everyMs: SLOW_MS };
+const transfers = (which: string): Table => ({
+  name: "sdo",
+  path: `bus/transfers?which=${which}&limit=1000`,
+  everyMs: SLOW_MS,
+});
+
+/** A table of what is shown, asked for again and again; of a recording that stands still only where it has moved. */
+function useTable<T>({ name, path, everyMs }: Table) {
+  const { ctx } = useShown();
+  const standing = useStanding();
+  return useQuery({
+    queryKey: ["bus", ctx, name, path, standing],
+    queryFn: ({ signal }) => get<T>(`${baseOf(ctx)}/${path}`, signal),
+    refetchInterval: standing === null ? everyMs : false,
+    placeholderData: keepPreviousData,
     staleTime: 0,
+    ...(standing === null ? {} : { gcTime: 0 }),
     retry: false,
   });
 }
 
-export const nodesQuery = table<BusNode[]>("nodes", "/api/live/bus/nodes", SLOW_MS);
-export const identifiersQuery = table<BusIdentifier[]>("ids", "/api/live/bus/identifiers", FAST_MS);
-export const loadQuery = table<BusLoadLine[]>("load", "/api/live/bus/load", SLOW_MS);
-export const emergenciesQuery = table<EmcyLine[]>("emcy", "/api/live/bus/emergencies", SLOW_MS);
-export const transfersQuery = (which: string) =>
-  table<SdoLine[]>("sdo", `/api/live/bus/transfers?which=${which}&limit=1000`, SLOW_MS);
+export const useBusNodes = () => useTable<BusNode[]>(NODES).data ?? [];
+export const useIdentifiers = () => useTable<BusIdentifier[]>(IDENTIFIERS).data ?? [];
+export const useBusLoad = () => useTable<BusLoadLine[]>(LOAD).data ?? [];
+export const useEmergencies = () => useTable<EmcyLine[]>(EMERGENCIES).data ?? [];
+export const useTransfers = (which: string) => useTable<SdoLine[]>(transfers(which));

@@ -35,9 +35,11 @@ export type NodeData = Schemas["NodeLine"];
 export type AxisData = Schemas["AxisLine"];
 export type RotorData = Schemas["RotorLine"];
 export type InstructorData = Schemas["InstructorLine"];
+export type MotionData = Schemas["MotionLine"];
 export type ValuesData = Schemas["ValuesData"];
 export type ValueData = Schemas["ValueCell"];
 export type EventData = Schemas["EventLine"];
+export type CursorData = Schemas["CursorLine"];
 
 export type RecordingList = Schemas["RecordingList"];
 export type RecordingRef = Schemas["RecordingRef"];

@@ -45,7 +45,7 @@ export function AsLeft() {
       </Text>
       <Ages devices={left.data} />
       {reading.isError && <ProblemAlert error={reading.error} title={t("page.visit.left.failed")} />}
-      <NeedsRole role="technician">
+      <NeedsRole role="technician" device>
         {(locked) => (
           <Button
             mt={8}

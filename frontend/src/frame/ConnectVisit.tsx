@@ -1,4 +1,4 @@
-import { Button, Group, Loader, Modal, Stack, Text, Textarea, TextInput } from "@mantine/core";
+import { Button, Group, Loader, Stack, Text, Textarea, TextInput } from "@mantine/core";
 import { IconDoorExit } from "@tabler/icons-react";
 import { useMutation, useQuery } from "@tanstack/react-query";
 import { useState } from "react";
@@ -10,6 +10,7 @@ import { notify } from "../ui/notices";
 import { ProblemAlert } from "../ui/ProblemAlert";
 import { age } from "../ui/format";
 import { useServerNow } from "../live/live";
+import { Dialog } from "../ui/Dialog";
 
 const MINUTE_MS = 60_000;
 const LONGEST = { reason: 2000, order: 100 };
@@ -20,12 +21,12 @@ export function EndVisit({ onClose }: { onClose: () => void }) {
   const present = useQuery(visitQuery);
   const visit = present.data?.visit;
   return (
-    <Modal opened onClose={onClose} title={t("page.visit.title")} size="lg">
+    <Dialog opened onClose={onClose} title={t("page.visit.title")} size="lg">
       {present.isError && <ProblemAlert error={present.error} title={t("page.visit.failed")} />}
       {present.isPending && <Loader aria-label={t("page.loading")} />}
       {visit === null && <Text>{t("page.visit.none")}</Text>}
       {visit && <Form key={visit.id} visit={visit} onClose={onClose} />}
-    </Modal>
+    </Dialog>
   );
 }
 

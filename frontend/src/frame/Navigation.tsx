@@ -11,7 +11,7 @@ import {
   IconTopologyBus,
 } from "@tabler/icons-react";
 import { Link } from "@tanstack/react-router";
-import { useInstructor } from "../live/live";
+import { useLiveInstructor } from "../live/live";
 import { useTexts } from "../texts/texts";
 import classes from "./Frame.module.css";
 import { INSTRUCTOR, type RoomPath, ROOMS } from "./rooms";
@@ -32,7 +32,8 @@ const ICONS: Record<RoomPath, Icon> = {
 /** The rooms; the device and the blade that one is about go along. */
 export function Navigation() {
   const t = useTexts();
-  const ours = useInstructor()?.available === true;
+  const liveInstructor = useLiveInstructor();
+  const ours = liveInstructor?.available === true;
   const rooms = ROOMS.filter(({ path }) => ours || path !== INSTRUCTOR);
   return (
     <nav className={classes.rooms} aria-label={t("page.rooms.label")}>

@@ -7,6 +7,8 @@ import {
   IconPlugConnectedX,
 } from "@tabler/icons-react";
 import { useEffect, useRef, useState } from "react";
+import { replayOf } from "../live/channel";
+import { useShown } from "../live/live";
 import { useTexts } from "../texts/texts";
 import classes from "./SceneDock.module.css";
 import { Facts } from "./SceneDockFacts";
@@ -77,7 +79,8 @@ function SceneView() {
   const [attempt, setAttempt] = useState(0);
   const view = useView();
   // The frame gets its first view by its address; what changes later it is told, without being loaded again.
-  const [address] = useState(() => addressOf(view));
+  const { ctx } = useShown();
+  const [address] = useState(() => addressOf(view, ctx));
 
   const select = (blade: number | null) => update({ blade: blade === null ? undefined : String(blade) });
   useSceneMessages(frame, (message) => {
@@ -150,8 +153,11 @@ function useView(): View {
   return next;
 }
 
-function addressOf(view: View): string {
-  return `/viser/?hideViserLogo&camera=${view.camera}${view.theme === "dark" ? "&darkMode" : ""}`;
+/** The bench has one 3D view, each recording one of its own. */
+function addressOf(view: View, ctx: string): string {
+  const replay = replayOf(ctx);
+  const place = replay === null ? "/viser/" : `/viser/replay/${encodeURIComponent(replay)}/`;
+  return `${place}?hideViserLogo&camera=${view.camera}${view.theme === "dark" ? "&darkMode" : ""}`;
 }
 
 function Lost() {

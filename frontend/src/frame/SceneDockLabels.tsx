@@ -1,7 +1,9 @@
 import { type Ref, useImperativeHandle, useRef } from "react";
+import type { AxisData } from "../api/types";
 import { useAxes } from "../live/live";
 import { figure } from "../model/values";
 import { useTexts } from "../texts/texts";
+import { timeOfDay } from "../ui/format";
 import { LookSign } from "./SceneDockLooks";
 import classes from "./SceneDock.module.css";
 import { arranged, type CameraName, type Places } from "./sceneDockBridge";
@@ -86,13 +88,17 @@ function BladeLabel({ blade, place, selected, onSelect }: BladeLabelProps) {
       <LookSign look={look} />
       <b>{blade}</b>
       <span className={classes.angle}>{angle}</span>
-      <span className={classes.state}>{stateWord(t, axis?.state, look)}</span>
+      <span className={classes.state}>{stateWord(t, axis, look)}</span>
     </button>
   );
 }
 
-/** The state of the drive; what is not the present says so first. */
-function stateWord(t: ReturnType<typeof useTexts>, state: string | null | undefined, look: string): string {
+/** The state of the drive; what is not the present says so first, and since when. */
+function stateWord(t: ReturnType<typeof useTexts>, axis: AxisData | undefined, look: string): string {
+  const sinceNs = axis?.position_t_ns ?? null;
+  if (look === "stale" && sinceNs !== null)
+    return t("page.look.stale_since", { time: timeOfDay(sinceNs / 1e6, 0) });
+  const state = axis?.state;
   return state == null || look === "stale" || look === "unknown" ? t(`page.look.${look}`) : t(state);
 }
 

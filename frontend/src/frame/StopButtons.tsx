@@ -1,9 +1,12 @@
 import { Tooltip } from "@mantine/core";
+import { useQuery } from "@tanstack/react-query";
+import { turbineQuery } from "../api/queries";
 import { IconHandStop, IconWind } from "@tabler/icons-react";
 import { useAxes, useHearing, useLink } from "../live/live";
 import { useTexts } from "../texts/texts";
 import classes from "./Frame.module.css";
 import { mayMove } from "../live/axis";
+import { usePageSearch } from "./search";
 import { Halt, useHalt, useLendStop } from "./stop";
 
 /** Always at the same place. Grey only where nothing is connected; a deaf page still tries. */
@@ -14,10 +17,23 @@ export function StopButtons() {
   const moving = mayMove(useAxes().values());
   const stop = useHalt(Halt.Stop);
   const feather = useHalt(Halt.Feather);
+  const turbine = useQuery(turbineQuery).data?.name;
+  const [search] = usePageSearch();
   useLendStop(stop.mutate);
   const nothing = !deaf && link?.state === "disconnected";
   return (
     <div className={classes.stops} role="group" aria-label={t("page.stop.group")}>
+      {search.replay !== undefined && (
+        <span className={classes.stopsOn} data-testid="stop-on">
+          {nothing || turbine === undefined ? (
+            t("page.replay.stop_none")
+          ) : (
+            <>
+              {t("page.replay.stop_on")} <b>{turbine}</b>
+            </>
+          )}
+        </span>
+      )}
       <Tooltip label={t("page.feather.explain")}>
         <button
           type="button"

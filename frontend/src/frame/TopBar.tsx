@@ -3,6 +3,7 @@ import {
   IconAlertTriangle,
   IconBroadcast,
   IconCpu,
+  IconHistory,
   IconLanguage,
   IconMoon,
   IconPlugOff,
@@ -13,6 +14,7 @@ import { useComputedColorScheme } from "@mantine/core";
 import type { LinkData, Mode, RecordingStatus } from "../api/types";
 import { useHearing, useLink, useLoadHistory, useServerNow } from "../live/live";
 import { figure } from "../model/values";
+import { ControlMark } from "../motion/ControlMark";
 import { type Translate, useTexts } from "../texts/texts";
 import { Sparkline } from "../ui/Sparkline";
 import { clock, megabytes } from "../ui/format";
@@ -35,6 +37,7 @@ export function TopBar() {
       <RecordingLight link={link} />
       <InstructorMark />
       <div className={classes.spacer} />
+      <ControlMark />
       <Tools />
       <UserMenu />
       <StopButtons />
@@ -42,7 +45,13 @@ export function TopBar() {
   );
 }
 
-const MODE_ICONS = { live: IconBroadcast, twin: IconCpu, none: IconPlugOff, deaf: IconWifiOff };
+const MODE_ICONS = {
+  live: IconBroadcast,
+  twin: IconCpu,
+  none: IconPlugOff,
+  deaf: IconWifiOff,
+  replay: IconHistory,
+};
 
 function ModeBadge({ mode, connected }: { mode: Mode; connected: boolean }) {
   const t = useTexts();

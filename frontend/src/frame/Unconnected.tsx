@@ -26,7 +26,7 @@ export function Unconnected() {
       {known.isError && <p className="tone-error">{storyOf(known.error, t).happened}</p>}
       <div className={classes.ways}>
         {turbines.map((one) => (
-          <NeedsRole key={one.slug} role="technician">
+          <NeedsRole key={one.slug} role="technician" device>
             {(locked) => (
               <Button
                 leftSection={<IconPlug size={18} aria-hidden />}

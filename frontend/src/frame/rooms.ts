@@ -16,4 +16,7 @@ export const ROOMS = [
 
 export const INSTRUCTOR = "/instructor";
 
+/** Rooms that are about the bench and what is kept, whatever the page shows. */
+export const LIVE_ROOMS: readonly string[] = ["/sets", "/procedures", "/settings", INSTRUCTOR];
+
 export type RoomPath = (typeof ROOMS)[number]["path"];

@@ -3,7 +3,7 @@ import { parseSearch, readSearch, roomSearch, stringifySearch, type PageSearch }
 
 const LOOKS =
   "lang=de&theme=light&scene=off&camera=hub&ghost=off&events=open&eventq=bus&severity=error&drawer=tall";
-const ABOUT = "device=wtg-07/blade-2/pmc&blade=2";
+const ABOUT = "replay=3-following-error&at=1750000000000000000&device=wtg-07/blade-2/pmc&blade=2";
 const OWN =
   "q=temp&only=changed&view=side&review=open&closed=a,b&sort=-name&hide=unit&edit=3110:01&span=120&file=a.mcap&find=x" +
   "&order=-size&less=hash&compare=different&node=12&set=percent:30&scenario=mains_failure&procedure=back_up&section=users&person=a&kind=write&tab=nodes&nodes=1,2" +

@@ -15,6 +15,9 @@ export interface PageSearch {
   /** Ghosts at the demanded angles are shown unless it says "off". */
   ghost?: "off";
   events?: "open";
+  /** The recording that is replayed, and the time at which its cursor stands, in ns. */
+  replay?: string;
+  at?: string;
   device?: string;
   q?: string;
   /** Which parameters are shown: "changed", "different", "unsaved", "starred", "pending", separated by commas. */
@@ -88,9 +91,22 @@ export interface PageSearch {
   motor?: string;
   /** The restore that is open. */
   restore?: string;
+  /** What the plots of a replay show, and the stretch in view in s since its beginning ("12.5-14"). */
+  plots?: string;
+  window?: string;
+  /** The moment that a replay's parameters are compared with: a time in ns, or "latest", "golden", "delivered". */
+  against?: string;
+  /** Code of the incident that is open, and the stretch that its link loops, in ns ("from-to"). */
+  incident?: string;
+  loop?: string;
+  /** What is laid over: recordings with their zeros, and the signals of all of them (pages/recordings/overlay/choice.ts). */
+  overlay?: string;
+  curves?: string;
 }
 
 const TEXTS = [
+  "replay",
+  "at",
   "device",
   "q",
   "only",
@@ -134,10 +150,17 @@ const TEXTS = [
   "select",
   "motor",
   "restore",
+  "plots",
+  "window",
+  "against",
+  "incident",
+  "loop",
+  "overlay",
+  "curves",
 ] as const;
 
 /**
- * What goes along from room to room: how the page looks, and which blade and device it is about. Everything else belongs
+ * What goes along from room to room: how the page looks, which recording it shows, and which blade and device it is about. Everything else belongs
  * to one room and would mean something else, or nothing, in another: a name filtered for in the parameters would hide
  * the frames of the bus.
  */
@@ -151,6 +174,8 @@ const TRAVELS = [
   "eventq",
   "severity",
   "drawer",
+  "replay",
+  "at",
   "device",
   "blade",
 ] as const satisfies readonly (keyof PageSearch)[];
@@ -178,8 +203,13 @@ export function readSearch(raw: Record<string, unknown>): PageSearch {
     const text = raw[name];
     if (typeof text === "string" && text !== "") search[name] = text;
   }
+  if (search.plots === undefined && typeof raw.signals === "string" && raw.signals !== "")
+    search.plots = plotsOfLink(raw.signals);
   return search;
 }
+
+/** The short link of an incident names its signals with their turbine; plots of the page are of any turbine. */
+const plotsOfLink = (signals: string): string => signals.replace(/(^|[,;])[^/,;]+\//g, "$1");
 
 /** Plain `name=text` pairs, so that `?device=wtg-07/blade-2/pmc&edit=3110:01` reads as it is written. */
 export function parseSearch(text: string): Record<string, string> {

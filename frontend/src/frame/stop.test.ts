@@ -1,6 +1,6 @@
 import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
 import type { AxisData, LinkData } from "../api/types";
-import { store } from "../live/live";
+import { liveStore } from "../live/live";
 import { lendStop, stopOnEscape } from "./stop";
 
 /** One function hears the keys of the page and those of the 3D frame. */
@@ -20,9 +20,9 @@ function press(key: string, repeat = false): boolean {
 
 function tell(state: string | null, link: "connected" | "lost" | "disconnected" = "connected"): void {
   const envelope = { v: 1, ctx: "live", seq: 1, t_ns: 1e9 } as const;
-  store.apply({ ...envelope, type: "link", data: { state: link, load: 0 } as LinkData });
+  liveStore.apply({ ...envelope, type: "link", data: { state: link, load: 0 } as LinkData });
   const axis = { blade: 1, state, stale: false, velocity_dps: 0 } as AxisData;
-  store.apply({ ...envelope, type: "axes", data: [axis] });
+  liveStore.apply({ ...envelope, type: "axes", data: [axis] });
 }
 
 describe("Esc", () => {

@@ -3,7 +3,7 @@ import { useMutation } from "@tanstack/react-query";
 import { useEffect } from "react";
 import { commands } from "../api/client";
 import type { StopResult } from "../api/types";
-import { store } from "../live/live";
+import { liveStore } from "../live/live";
 import { mayMove } from "../live/axis";
 import { type Translate, useTexts } from "../texts/texts";
 import { useDeviceName } from "../ui/devices";
@@ -69,7 +69,8 @@ export function useLendStop(stop: StopRequest): void {
 
 /** While anything can move, Esc is STOP and nothing else. Taken in the capture phase, before any dialog sees it. */
 export function stopOnEscape(event: KeyboardEvent): void {
-  if (event.key !== "Escape" || store.link?.state !== "connected" || !mayMove(store.axes.values())) return;
+  if (event.key !== "Escape" || liveStore.link?.state !== "connected" || !mayMove(liveStore.axes.values()))
+    return;
   event.preventDefault();
   event.stopImmediatePropagation();
   if (!event.repeat) stopNow?.();

@@ -3,6 +3,7 @@ import { useQuery } from "@tanstack/react-query";
 import { useRouterState } from "@tanstack/react-router";
 import { useEffect } from "react";
 import { turbineQuery } from "../api/queries";
+import type { Replay } from "../replay/opening";
 import { type Translate, useTexts } from "../texts/texts";
 import { ROOMS } from "./rooms";
 
@@ -14,10 +15,12 @@ export function titleOf(path: string, turbine: string | undefined, t: Translate)
   return t(turbine === undefined ? "page.title.room" : "page.title.turbine", words);
 }
 
-export function usePageTitle(): void {
+/** Of a replay the turbine that was recorded, and that it was. */
+export function usePageTitle(replay: Replay | null): void {
   const t = useTexts();
   const path = useRouterState({ select: (state) => state.location.pathname });
-  const turbine = useQuery(turbineQuery).data?.name;
+  const connected = useQuery(turbineQuery).data?.name;
+  const turbine = replay ? t("page.title.recorded", { turbine: replay.doc?.name ?? replay.id }) : connected;
   const title = titleOf(path, turbine, t);
   useEffect(() => {
     document.title = title;

@@ -1,5 +1,5 @@
 import { beforeEach, describe, expect, it } from "vitest";
-import type { AxisData, ServerMessage, ValueData } from "../api/types";
+import type { AxisData, CursorData, EventData, ServerMessage, ValueData } from "../api/types";
 import { Backoff } from "./backoff";
 import { DeafnessTimer } from "./deafness";
 import { LiveStore } from "./store";
@@ -153,5 +153,67 @@ describe("store", () => {
     send("axes", [axis(80)], 1e9);
     send("axes", [axis(80, true)], 1.1e9);
     expect(store.traces.get(1)?.columns(60).positions).toEqual([80, null]);
+  });
+});
+
+describe("store of a recording", () => {
+  const S = 1_000_000_000;
+  const cursor = (t_ns: number, speed = 1): CursorData => ({
+    t_ns,
+    playing: true,
+    speed,
+    attained: speed,
+    from_ns: NOW_NS,
+    to_ns: NOW_NS + 60 * S,
+    loop: null,
+    seeking: false,
+  });
+  const event = (t_ns: number): EventData => ({
+    t_ns,
+    severity: "info",
+    device: null,
+    text_key: "journal.note",
+    details: {},
+    person: null,
+  });
+
+  beforeEach(() => {
+    store = new LiveStore(
+      (flushNow) => flushes.push(flushNow),
+      () => nowMs,
+      true,
+    );
+  });
+
+  it("goes by the time of its cursor: nothing ages while that stands still", () => {
+    send("cursor", cursor(NOW_NS + 5 * S), NOW_NS + 5 * S);
+    nowMs += 60_000;
+    expect(store.serverNowMs()).toBe((NOW_NS + 5 * S) / 1e6);
+    expect(store.cursor?.t_ns).toBe(NOW_NS + 5 * S);
+  });
+
+  it("forgets all, events too, where the cursor was set elsewhere", () => {
+    send("bench", { epoch: 1, turbine: "wtg-07", visit: null });
+    send("event", event(NOW_NS + 5 * S));
+    send("axes", [axis(10)], NOW_NS + 5 * S);
+    send("values", { device: PMC, full: true, values: { "6065": value("0A") } });
+    send("bench", { epoch: 2, turbine: "wtg-07", visit: null }, NOW_NS + S);
+    expect(store.events).toEqual([]);
+    expect(store.axes.size).toBe(0);
+    expect(store.cell(PMC, "6065")).toBeUndefined();
+    send("axes", [axis(3)], NOW_NS + S);
+    expect(store.traces.get(1)?.columns(60).positions).toEqual([3]);
+  });
+
+  it("breaks a trace where messages are missing, by how fast it plays", () => {
+    const played = (speed: number) => {
+      send("bench", { epoch: speed, turbine: "wtg-07", visit: null });
+      send("cursor", cursor(NOW_NS, speed));
+      send("axes", [axis(1)], NOW_NS);
+      send("axes", [axis(2)], NOW_NS + 3 * S);
+      return store.traces.get(1)?.columns(60).positions;
+    };
+    expect(played(1)).toEqual([1, null, 2]);
+    expect(played(10)).toEqual([1, 2]);
   });
 });

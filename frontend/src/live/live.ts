@@ -1,9 +1,23 @@
-/** The one live store and socket of the page, and the hooks by which components see them. */
-import { useCallback, useEffect, useState, useSyncExternalStore } from "react";
+/**
+ * The channels and the one socket of the page, and the hooks by which components see what is shown.
+ *
+ * The hooks read what is shown where they stand: the bench, or in the rooms of a replay the recording at its cursor. What
+ * is said of the bench whatever is shown (hearing, STOP, the top bar) stands outside of these rooms, or is named "Live".
+ */
+import {
+  createContext,
+  useCallback,
+  useContext,
+  useEffect,
+  useMemo,
+  useState,
+  useSyncExternalStore,
+} from "react";
 import type { TraceFilter } from "../api/trace";
-import { FrameStore, type TraceView } from "./frames";
-import { LiveSocket } from "./socket";
-import { type Cell, LiveStore } from "./store";
+import { Channel, contextOf, LIVE } from "./channel";
+import type { TraceView } from "./frames";
+import { type Beat, LiveSocket } from "./socket";
+import type { Cell, LiveStore } from "./store";
 
 const HIDDEN_TICK_MS = 250;
 
@@ -13,59 +27,109 @@ function schedule(flush: () => void): void {
   else requestAnimationFrame(flush);
 }
 
-export const store = new LiveStore(schedule, () => Date.now());
-export const frames = new FrameStore(schedule);
+export const live = new Channel(LIVE, schedule);
+
+/** What is known of the bench, whatever the page shows. */
+export const liveStore = live.store;
 
 let socket: LiveSocket | null = null;
 
 export function startLive(): void {
   const scheme = location.protocol === "https:" ? "wss" : "ws";
-  socket ??= new LiveSocket(`${scheme}://${location.host}/api/ws`, store, frames);
+  socket ??= new LiveSocket(`${scheme}://${location.host}/api/ws`, live);
 }
 
-function useTopic<T>(topic: string, read: () => T): T {
-  const subscribe = useCallback((listener: () => void) => store.subscribe(topic, listener), [topic]);
-  return useSyncExternalStore(subscribe, read);
+/** Say that this page holds an axis, or that it does not; false where the socket is not open. */
+export function sendBeat(beat: Beat): boolean {
+  return socket?.beat(beat) ?? false;
 }
 
-export const useHearing = () => useTopic("hearing", () => store.hearing);
-export const useBench = () => useTopic("bench", () => store.bench);
-export const useLink = () => useTopic("link", () => store.link);
-export const useNodes = () => useTopic("nodes", () => store.nodes);
-export const useAxes = () => useTopic("axes", () => store.axes);
-export const useRotor = () => useTopic("rotor", () => store.rotor);
-export const useInstructor = () => useTopic("instructor", () => store.instructor);
-export const useEvents = () => useTopic("events", () => store.events);
-export const useLoadHistory = () => useTopic("link", () => store.loadHistory);
+/** A channel for a recording, or the bench's where none is named. */
+export function useChannel(replay: string | undefined): Channel {
+  return useMemo(() => (replay === undefined ? live : new Channel(contextOf(replay), schedule)), [replay]);
+}
+
+/** Hear of a channel while it is called for; the answer ends it. */
+export function openChannel(channel: Channel, gone: () => void): () => void {
+  return socket?.open(channel, gone) ?? (() => undefined);
+}
+
+/** What the components below show. */
+export const ShownContext = createContext<Channel>(live);
+
+export const useShown = (): Channel => useContext(ShownContext);
+export const useStore = (): LiveStore => useShown().store;
+
+function useTopicOf<T>(store: LiveStore, topic: string, read: (store: LiveStore) => T): T {
+  const subscribe = useCallback((listener: () => void) => store.subscribe(topic, listener), [store, topic]);
+  return useSyncExternalStore(subscribe, () => read(store));
+}
+
+const useTopic = <T>(topic: string, read: (store: LiveStore) => T): T => useTopicOf(useStore(), topic, read);
+
+/** Whether the page hears the bench: one socket brings everything. */
+export const useHearing = () => useTopicOf(liveStore, "hearing", (store) => store.hearing);
+export const useLiveLink = () => useTopicOf(liveStore, "link", (store) => store.link);
+export const useLiveInstructor = () => useTopicOf(liveStore, "instructor", (store) => store.instructor);
+/** Who may move the axes; always of the bench. */
+export const useMotion = () => useTopicOf(liveStore, "motion", (store) => store.motion);
+export const useLiveBench = () => useTopicOf(liveStore, "bench", (store) => store.bench);
+
+export const useBench = () => useTopic("bench", (store) => store.bench);
+export const useLink = () => useTopic("link", (store) => store.link);
+export const useNodes = () => useTopic("nodes", (store) => store.nodes);
+export const useAxes = () => useTopic("axes", (store) => store.axes);
+export const useRotor = () => useTopic("rotor", (store) => store.rotor);
+export const useInstructor = () => useTopic("instructor", (store) => store.instructor);
+export const useEvents = () => useTopic("events", (store) => store.events);
+export const useLoadHistory = () => useTopic("link", (store) => store.loadHistory);
+/** The place of a cursor that stands still, in ns; null while time goes on. */
+export const useStanding = () =>
+  useTopic("cursor", ({ cursor }) => (cursor === null || cursor.playing ? null : cursor.t_ns));
+/** Where the recording stands; null for the bench. */
+export const useCursor = () => useTopic("cursor", (store) => store.cursor);
 
 export function useCell(device: string, address: string): Cell | undefined {
-  return useTopic(`value:${device}/${address}`, () => store.cell(device, address));
+  return useTopic(`value:${device}/${address}`, (store) => store.cell(device, address));
 }
 
 /** Raised with every message of values of the device. */
 export function useDeviceVersion(device: string): number {
-  return useTopic(`device:${device}`, () => store.version(device));
+  return useTopic(`device:${device}`, (store) => store.version(device));
 }
 
 /** Keeps the values of the device coming while the component is there. */
 export function useWatchDevice(slug: string | null): void {
-  useEffect(() => (slug === null ? undefined : socket?.watchDevice(slug)), [slug]);
+  const shown = useShown();
+  useEffect(() => (slug === null ? undefined : shown.watchDevice(slug)), [shown, slug]);
 }
 
 /** The rows of the trace that the page keeps. */
-export const useFrames = (): TraceView => useSyncExternalStore(frames.subscribe, () => frames.view);
-
-/** Has the running trace come with this number while it is called for. */
-export function watchTrace(filter: TraceFilter, id: number): () => void {
-  return socket?.watchTrace({ ...filter, id }) ?? (() => undefined);
+export function useFrames(): TraceView {
+  const { frames } = useShown();
+  return useSyncExternalStore(frames.subscribe, () => frames.view);
 }
 
-/** The server's clock, ms, renewed every `everyMs`: for ages and running clocks. */
+/** Has the running trace come with this number while it is called for. */
+export function watchTrace(channel: Channel, filter: TraceFilter, id: number): () => void {
+  return channel.watchTrace({ ...filter, id });
+}
+
+/** What is now, ms, renewed every `everyMs`: for ages and running clocks. A cursor that is set elsewhere is seen at once. */
 export function useServerNow(everyMs: number): number {
+  const { store, recorded } = useShown();
   const [now, setNow] = useState(() => store.serverNowMs());
   useEffect(() => {
-    const timer = setInterval(() => setNow(store.serverNowMs()), everyMs);
-    return () => clearInterval(timer);
-  }, [everyMs]);
+    const look = () => setNow(store.serverNowMs());
+    const timer = setInterval(look, everyMs);
+    const standing = () => {
+      if (store.cursor?.playing !== true) look();
+    };
+    const ends = recorded ? [store.subscribe("bench", look), store.subscribe("cursor", standing)] : [];
+    return () => {
+      clearInterval(timer);
+      for (const end of ends) end();
+    };
+  }, [store, recorded, everyMs]);
   return now;
 }

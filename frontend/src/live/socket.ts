@@ -1,38 +1,38 @@
 /**
  * The socket to the bench: connects, hears, notices within a second that it is deaf, and connects again by itself.
- * The set of topics is sent anew after every connection, and whenever it changes.
+ * The topics of every channel are sent anew after every connection, and whenever they change. One socket serves all.
  */
 import { signedOut } from "../api/client";
+import type { components } from "../api/generated";
 import type { ServerMessage } from "../api/types";
 import { Backoff } from "./backoff";
 import { DeafnessTimer } from "./deafness";
-import type { TraceFilter } from "../api/trace";
-import type { FrameStore } from "./frames";
-import type { LiveStore } from "./store";
+import type { Channel } from "./channel";
+
+/** What a page with the lease says: that it is there, and whether its person holds what moves an axis. */
+export type Beat = Omit<Schemas["Beat"], "type">;
+type Schemas = components["schemas"];
 
 const CHECK_MS = 100;
 const GIVE_UP_MS = 3000;
 /** Code with which the server closes the socket of a session that has ended. */
 const SIGNED_OUT = 4401;
-const BASE_TOPICS = ["link", "nodes", "axes", "rotor", "instructor", "events"];
 
 export class LiveSocket {
   private readonly url: string;
-  private readonly store: LiveStore;
-  private readonly frames: FrameStore;
-  private trace: (TraceFilter & { id: number }) | null = null;
+  private readonly live: Channel;
+  private readonly channels = new Map<string, Channel>();
   private readonly backoff = new Backoff();
   private readonly timer = new DeafnessTimer(performance.now());
-  private readonly devices = new Map<string, number>();
   private socket: WebSocket | null = null;
   private openedMs = 0;
   private retry: ReturnType<typeof setTimeout> | null = null;
   private lastHeardWallMs: number | null = null;
 
-  constructor(url: string, store: LiveStore, frames: FrameStore) {
+  constructor(url: string, live: Channel) {
     this.url = url;
-    this.store = store;
-    this.frames = frames;
+    this.live = live;
+    this.open(live, () => undefined);
     // The page cannot stop hearing while it exists: these two are never removed.
     setInterval(() => this.check(), CHECK_MS);
     // Timers of a hidden page are slowed down: look again at the moment it is shown.
@@ -40,26 +40,19 @@ export class LiveSocket {
     this.connect();
   }
 
-  /** Ask for the values of a device; the answer ends it. */
-  watchDevice(slug: string): () => void {
-    this.devices.set(slug, (this.devices.get(slug) ?? 0) + 1);
-    this.sendTopics();
+  /** Hear of a channel; `gone` is called where the server does not know it. The answer ends it. */
+  open(channel: Channel, gone: () => void): () => void {
+    this.channels.set(channel.ctx, channel);
+    channel.attach(() => this.subscribe(channel), gone);
+    this.subscribe(channel);
     return () => {
-      const left = (this.devices.get(slug) ?? 1) - 1;
-      if (left > 0) this.devices.set(slug, left);
-      else this.devices.delete(slug);
-      this.sendTopics();
-    };
-  }
-
-  /** Ask for the running trace; the answer ends it. There is one at a time. */
-  watchTrace(filter: TraceFilter & { id: number }): () => void {
-    this.trace = filter;
-    this.sendTopics();
-    return () => {
-      if (this.trace !== filter) return;
-      this.trace = null;
-      this.sendTopics();
+      if (this.channels.get(channel.ctx) !== channel) return;
+      this.channels.delete(channel.ctx);
+      channel.attach(
+        () => undefined,
+        () => undefined,
+      );
+      this.say({ type: "subscribe", ctx: channel.ctx, topics: [] });
     };
   }
 
@@ -68,7 +61,9 @@ export class LiveSocket {
     const socket = new WebSocket(this.url);
     this.socket = socket;
     this.openedMs = performance.now();
-    socket.onopen = () => this.sendTopics();
+    socket.onopen = () => {
+      for (const channel of this.channels.values()) this.subscribe(channel);
+    };
     socket.onmessage = (message: MessageEvent<string>) => this.take(socket, message.data);
     socket.onclose = (event) => {
       if (event.code === SIGNED_OUT) signedOut();
@@ -82,9 +77,12 @@ export class LiveSocket {
     this.timer.heard(performance.now());
     this.lastHeardWallMs = Date.now();
     const message = JSON.parse(text) as ServerMessage;
-    if (message.type === "trace") this.frames.take(message.data, performance.now());
-    else this.store.apply(message);
-    if (this.store.hearing.state !== "hearing") this.store.setHearing({ state: "hearing", sinceMs: null });
+    const channel = this.channels.get(message.ctx);
+    if (message.type === "gone") channel?.tellGone();
+    else if (message.type === "trace") channel?.frames.take(message.data, performance.now());
+    else channel?.store.apply(message);
+    const { store } = this.live;
+    if (store.hearing.state !== "hearing") store.setHearing({ state: "hearing", sinceMs: null });
   }
 
   private lost(socket: WebSocket): void {
@@ -97,7 +95,7 @@ export class LiveSocket {
     const nowMs = performance.now();
     const { deaf, lastHeardMs } = this.timer.check(nowMs);
     if (!deaf) return;
-    this.store.setHearing({ state: "deaf", sinceMs: this.lastHeardWallMs });
+    this.live.store.setHearing({ state: "deaf", sinceMs: this.lastHeardWallMs });
     // An open socket that says nothing is no connection: drop it, so that a new one is made.
     const silentMs = nowMs - Math.max(lastHeardMs ?? 0, this.openedMs);
     if (this.socket && silentMs > GIVE_UP_MS) {
@@ -107,12 +105,18 @@ export class LiveSocket {
     }
   }
 
-  private sendTopics(): void {
-    if (this.socket?.readyState !== WebSocket.OPEN) return;
-    const slugs = [...this.devices.keys()];
-    const topics = [...BASE_TOPICS, ...slugs.map((slug) => `values:${slug}`)];
-    const { trace } = this;
-    if (trace !== null) topics.push("trace");
-    this.socket.send(JSON.stringify({ type: "subscribe", topics, ...(trace === null ? {} : { trace }) }));
+  private subscribe(channel: Channel): void {
+    if (this.channels.get(channel.ctx) === channel) this.say(channel.request());
+  }
+
+  /** The dead man; false where the socket is not open. */
+  beat(beat: Beat): boolean {
+    return this.say({ type: "beat", ...beat });
+  }
+
+  private say(request: object): boolean {
+    if (this.socket?.readyState !== WebSocket.OPEN) return false;
+    this.socket.send(JSON.stringify(request));
+    return true;
   }
 }

@@ -3,14 +3,18 @@
  *
  * Messages are taken in at once but shown coalesced: listeners of a topic are told at most once a tick of `schedule`
  * (an animation frame in the browser), however many messages came. Topics: "hearing", "bench", "link", "nodes", "axes",
- * "rotor", "instructor", "events", "device:<slug>" and "value:<slug>/<address>".
+ * "rotor", "instructor", "motion", "events", "cursor", "device:<slug>" and "value:<slug>/<address>".
+ *
+ * The store of a recording goes by the time of its cursor, and forgets whatever it knew as soon as that is set elsewhere.
  */
 import type {
   AxisData,
   BenchData,
+  CursorData,
   EventData,
   InstructorData,
   LinkData,
+  MotionData,
   NodeData,
   RotorData,
   ServerMessage,
@@ -18,7 +22,7 @@ import type {
   ValuesData,
 } from "../api/types";
 import { followsDemand } from "./axis";
-import { Trace } from "./trace";
+import { type Columns, GAP_S, Trace } from "./trace";
 
 export const MAX_EVENTS = 500;
 const LOAD_HISTORY = 60;
@@ -48,8 +52,11 @@ export class LiveStore {
   axes: ReadonlyMap<number, AxisData> = new Map();
   rotor: RotorData | null = null;
   instructor: InstructorData | null = null;
+  motion: MotionData | null = null;
   events: readonly NumberedEvent[] = [];
   loadHistory: readonly number[] = [];
+  /** Where a recording stands; null for the bench. */
+  cursor: CursorData | null = null;
   readonly traces = new Map<number, Trace>();
 
   private readonly devices = new Map<string, Map<string, Cell>>();
@@ -61,10 +68,13 @@ export class LiveStore {
   private scheduled = false;
   private nextEventId = 1;
   private serverOffsetMs: number | null = null;
+  private readonly recorded: boolean;
+  private shownMs = 0;
 
-  constructor(schedule: (flush: () => void) => void, nowMs: () => number) {
+  constructor(schedule: (flush: () => void) => void, nowMs: () => number, recorded = false) {
     this.schedule = schedule;
     this.nowMs = nowMs;
+    this.recorded = recorded;
   }
 
   subscribe(topic: string, listener: Listener): () => void {
@@ -77,8 +87,9 @@ export class LiveStore {
     };
   }
 
-  /** Clock of the server now, in ms since 1970, as far as it is known. */
+  /** What is now, in ms since 1970: by the server's clock, as far as it is known; of a recording the time of its cursor. */
   serverNowMs(): number {
+    if (this.recorded) return this.shownMs;
     return this.nowMs() + (this.serverOffsetMs ?? 0);
   }
 
@@ -103,6 +114,7 @@ export class LiveStore {
 
   apply(message: ServerMessage): void {
     this.serverOffsetMs = message.t_ns / 1e6 - this.nowMs();
+    this.shownMs = message.t_ns / 1e6;
     switch (message.type) {
       case "hello":
       case "heartbeat":
@@ -124,11 +136,22 @@ export class LiveStore {
       case "instructor":
         this.instructor = message.data;
         return this.mark("instructor");
+      case "motion":
+        return this.takeMotion(message.data);
       case "values":
         return this.applyValues(message.data);
       case "event":
         return this.applyEvent(message.data);
+      case "cursor":
+        this.cursor = message.data;
+        return this.mark("cursor");
     }
+  }
+
+  /** Who may move the axes, as the socket or the answer to our own request says. */
+  takeMotion(motion: MotionData): void {
+    this.motion = motion;
+    this.mark("motion");
   }
 
   /** Another connection: whatever was known of the one before is void. */
@@ -143,26 +166,41 @@ export class LiveStore {
     this.axes = new Map();
     this.rotor = null;
     this.traces.clear();
-    for (const topic of ["nodes", "axes", "rotor"]) this.mark(topic);
+    // The bench goes on after another connection; what a recording tells is told anew from where its cursor stands.
+    if (this.recorded) this.events = [];
+    for (const topic of ["nodes", "axes", "rotor", "events"]) this.mark(topic);
     for (const device of [...this.devices.keys()]) this.applyValues({ device, full: true, values: {} });
   }
 
   private applyAxes(axes: AxisData[], tNs: number): void {
     this.axes = new Map([...this.axes, ...axes.map((axis) => [axis.blade, axis] as const)]);
+    // Played so many times as fast, what is told in a second lies so much farther apart.
+    const stretch = Math.max(1, this.cursor?.speed ?? 1);
     for (const axis of axes) {
       const trace = this.traces.get(axis.blade) ?? new Trace();
       this.traces.set(axis.blade, trace);
       // A stale position is a gap in the trace, never the last value drawn on.
       const demand = axis.stale || !followsDemand(axis) ? null : axis.demand_deg;
       const known = <T>(number: T | null) => (axis.stale ? null : number);
-      trace.push(tNs / 1e9, {
-        positionDeg: known(axis.position_deg),
-        demandDeg: demand,
-        velocityDps: known(axis.velocity_dps),
-        currentPct: known(axis.current_pct),
-      });
+      trace.push(
+        tNs / 1e9,
+        {
+          positionDeg: known(axis.position_deg),
+          demandDeg: demand,
+          velocityDps: known(axis.velocity_dps),
+          currentPct: known(axis.current_pct),
+        },
+        GAP_S * stretch,
+      );
     }
     this.mark("axes");
+  }
+
+  /** What an axis did before the cursor was set where it stands, as the index of the recording has it. */
+  fillTrace(blade: number, earlier: Columns): void {
+    const trace = this.traces.get(blade) ?? new Trace();
+    this.traces.set(blade, trace);
+    trace.prepend(earlier);
   }
 
   private applyValues({ device, full, values }: ValuesData): void {

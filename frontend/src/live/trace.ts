@@ -5,7 +5,7 @@ export const KEPT_S = 300;
 /** What the overview shows of it. */
 export const TRACE_S = 60;
 /** Where messages were missing for so long the line is broken, not drawn through. */
-const GAP_S = 1;
+export const GAP_S = 1;
 /** So much too old may be kept before it is cut off: cutting costs more than keeping. */
 const SLACK_S = 20;
 
@@ -31,13 +31,22 @@ export interface Columns {
 export class Trace {
   private readonly all: Columns = { times: [], positions: [], demands: [], velocities: [], currents: [] };
 
-  push(timeS: number, sample: Sample): void {
+  push(timeS: number, sample: Sample, gapS = GAP_S): void {
     const { times } = this.all;
     const last = times.at(-1);
     if (last !== undefined && timeS <= last) return;
-    if (last !== undefined && timeS - last > GAP_S) this.append(last + 0.001, NOTHING);
+    if (last !== undefined && timeS - last > gapS) this.append(last + 0.001, NOTHING);
     this.append(timeS, sample);
     if ((times[0] ?? timeS) < timeS - KEPT_S - SLACK_S) this.cut(timeS - KEPT_S);
+  }
+
+  /** What was before the first sample, oldest first. */
+  prepend(earlier: Columns): void {
+    const first = this.all.times[0] ?? Infinity;
+    const found = earlier.times.findIndex((timeS) => timeS >= first);
+    const count = found < 0 ? earlier.times.length : found;
+    for (const [name, column] of Object.entries(this.all) as [keyof Columns, unknown[]][])
+      column.unshift(...earlier[name].slice(0, count));
   }
 
   /** What lies in the `spanS` seconds before `endS`; by itself up to the latest sample. */

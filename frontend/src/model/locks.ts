@@ -2,6 +2,8 @@
 import type { EntryDoc, Session } from "../api/types";
 
 export enum Lock {
+  /** What is shown is a recording. */
+  Replay = "replay",
   Viewer = "viewer",
   ReadOnly = "ro",
   Constant = "const",
@@ -14,12 +16,13 @@ const PDO_FIRST = 0x1400;
 const PDO_END = 0x1c00;
 const COMMANDS = [0x1010, 0x1011];
 
-export function lockOf(entry: EntryDoc, role: Session["role"]): Lock | null {
+export function lockOf(entry: EntryDoc, role: Session["role"], recorded = false): Lock | null {
   if (entry.access === "const") return Lock.Constant;
   if (entry.access === "r(w)" && role !== "expert") return Lock.Factory;
   if (entry.access === "ro") return Lock.ReadOnly;
   if (entry.motion) return Lock.Motion;
   if (isCommunication(entry)) return Lock.Communication;
+  if (recorded) return Lock.Replay;
   return role === "viewer" ? Lock.Viewer : null;
 }
 

@@ -51,7 +51,7 @@ export interface StagedState {
 export type Keeper = Pick<Storage, "getItem" | "setItem">;
 
 export const MOST_UNDO_SETS = 10;
-const EMPTY: StagedState = { changes: new Map(), undo: [], writing: null, outcome: null };
+export const NOTHING_STAGED: StagedState = { changes: new Map(), undo: [], writing: null, outcome: null };
 const WRITTEN: readonly Job["rows"][number]["state"][] = [
   "verified",
   "unproven",
@@ -63,7 +63,7 @@ const WRITTEN: readonly Job["rows"][number]["state"][] = [
 export const keyOf = (device: string, address: string): string => `${device} ${address}`;
 
 export class StagedStore {
-  state: StagedState = EMPTY;
+  state: StagedState = NOTHING_STAGED;
   private place: string | null = null;
   private readonly listeners = new Set<() => void>();
 
@@ -186,12 +186,12 @@ function written(state: StagedState): string {
 
 /** What an earlier page left; nothing where it cannot be read. */
 function read(text: string | null): StagedState {
-  if (text === null) return EMPTY;
+  if (text === null) return NOTHING_STAGED;
   try {
     const kept = JSON.parse(text) as Omit<StagedState, "changes"> & { changes: Change[] };
     const changes = new Map(kept.changes.map((one) => [keyOf(one.device, one.address), one]));
     return { changes, undo: kept.undo, writing: kept.writing, outcome: kept.outcome };
   } catch {
-    return EMPTY;
+    return NOTHING_STAGED;
   }
 }

@@ -21,6 +21,8 @@ interface Props<Row> {
   fileName: string;
   empty: ReactNode;
   onOpen?: (row: Row) => void;
+  /** By a double click, and by Enter on the row that is open. */
+  onRun?: (row: Row) => void;
   selected?: string | undefined;
   tools?: ReactNode;
   /** Columns that are hidden until somebody chooses. */
@@ -121,6 +123,7 @@ export function DataTable<Row>(props: Props<Row>) {
         idOf={idOf}
         toneOf={props.toneOf}
         onOpen={props.onOpen}
+        onRun={props.onRun}
         selected={props.selected}
         hold={hold}
         head={<Head table={table} columns={visible} look={look} />}

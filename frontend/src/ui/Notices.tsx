@@ -1,4 +1,4 @@
-import { Notification } from "@mantine/core";
+import { Button, Notification } from "@mantine/core";
 import { IconAlertTriangle, IconCheck, IconX } from "@tabler/icons-react";
 import { useTexts } from "../texts/texts";
 import classes from "./Notices.module.css";
@@ -36,6 +36,11 @@ function One({ notice, close }: { notice: Notice; close: string }) {
       {notice.lines.map((line) => (
         <div key={line}>{line}</div>
       ))}
+      {notice.action && (
+        <Button variant="default" mt={6} onClick={notice.action.run} data-testid="notice-action">
+          {notice.action.label}
+        </Button>
+      )}
     </Notification>
   );
 }

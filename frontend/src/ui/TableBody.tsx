@@ -19,6 +19,7 @@ interface Props<Row> {
   idOf: (row: Row) => string;
   toneOf: ((row: Row) => string) | undefined;
   onOpen: ((row: Row) => void) | undefined;
+  onRun: ((row: Row) => void) | undefined;
   selected: string | undefined;
   hold: (part: "pointer" | "focus", inside: boolean) => void;
   head: ReactNode;
@@ -27,7 +28,7 @@ interface Props<Row> {
 
 /** Head and rows in one scroller. The row that the keyboard is at is known by its id: it is kept when rows move. */
 export function TableBody<Row>(props: Props<Row>) {
-  const { rows, columns, idOf, onOpen, selected, look, name, hold, headPx } = props;
+  const { rows, columns, idOf, onOpen, onRun, selected, look, name, hold, headPx } = props;
   const rowPx = props.dense ? DENSE_ROW_PX : ROW_PX;
   const scroller = useRef<HTMLDivElement>(null);
   const [at, setAt] = useState<string | null>(null);
@@ -63,7 +64,8 @@ export function TableBody<Row>(props: Props<Row>) {
     const row = rows[current];
     const onRow = event.target instanceof HTMLElement && event.target.role === "row";
     if (to !== undefined) go(to);
-    else if (event.key === "Enter" && onRow && row !== undefined) onOpen?.(row);
+    else if (event.key === "Enter" && onRow && row !== undefined)
+      (idOf(row) === selected ? (onRun ?? onOpen) : onOpen)?.(row);
     else return;
     event.preventDefault();
   };
@@ -114,6 +116,7 @@ export function TableBody<Row>(props: Props<Row>) {
                 setAt(id);
                 onOpen?.(row);
               }}
+              onDoubleClick={onRun && (() => onRun(row))}
             >
               {columns.map((column) => (
                 <div

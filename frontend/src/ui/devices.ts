@@ -1,6 +1,6 @@
 import { useQuery } from "@tanstack/react-query";
 import { useCallback } from "react";
-import { turbineQuery } from "../api/queries";
+import { useTurbineQuery } from "../api/queries";
 import type { DeviceRef, StationRef, Turbine } from "../api/types";
 import { type Translate, useTexts } from "../texts/texts";
 import { lastOf } from "./format";
@@ -23,7 +23,7 @@ export function stationName(station: StationRef, t: Translate): string {
 /** Names a device by its slug as people say it: "Blade 2 PMC"; the end of the slug where it is not known. */
 export function useDeviceName(): (slug: string) => string {
   const t = useTexts();
-  const turbine = useQuery(turbineQuery).data;
+  const turbine = useQuery(useTurbineQuery()).data;
   return useCallback(
     (slug) => {
       const place = placesOf(turbine).find((one) => one.device.slug === slug);

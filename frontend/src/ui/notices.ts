@@ -6,6 +6,8 @@ export interface Notice {
   tone: "ok" | "warning" | "error";
   title: string;
   lines: string[];
+  /** What can be done about it right here; such a notice stays until it is closed. */
+  action?: { label: string; run: () => void };
 }
 
 const SHOWN_MS = 6000;
@@ -24,7 +26,7 @@ export function notify(notice: Omit<Notice, "id">): void {
   const id = nextId;
   nextId += 1;
   change([...notices, { ...notice, id }].slice(-MAX_SHOWN));
-  if (notice.tone === "ok") setTimeout(() => dismiss(id), SHOWN_MS);
+  if (notice.tone === "ok" && !notice.action) setTimeout(() => dismiss(id), SHOWN_MS);
 }
 
 export function dismiss(id: number): void {

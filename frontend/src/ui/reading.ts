@@ -1,10 +1,10 @@
 /** One object of a device as a reading: its value in words, how fresh it is, and where it stands in the parameters. */
 import { useQuery } from "@tanstack/react-query";
 import { useMemo } from "react";
-import { descriptionQuery } from "../api/queries";
+import { useDescriptionQuery } from "../api/queries";
 import type { DescriptionDoc, DeviceRef, EntryDoc, Language, Raw } from "../api/types";
-import { store, useCell, useHearing, useLink, useNodes, useServerNow } from "../live/live";
-import type { Cell } from "../live/store";
+import { useCell, useHearing, useLink, useNodes, useServerNow, useStore } from "../live/live";
+import type { Cell, LiveStore } from "../live/store";
 import { type DeviceContext, type Shown, shownOf } from "../model/shown";
 import { figure } from "../model/values";
 import { useTexts } from "../texts/texts";
@@ -39,7 +39,7 @@ export function entriesOf(doc: DescriptionDoc): ReadonlyMap<string, EntryDoc> {
 }
 
 /** Latest raw value of an object, null where it is not known. */
-export function rawAt(device: string, address: string): Raw | null {
+export function rawAt(store: LiveStore, device: string, address: string): Raw | null {
   const cell = store.cell(device, address);
   return cell?.known ? cell.raw : null;
 }
@@ -47,15 +47,17 @@ export function rawAt(device: string, address: string): Raw | null {
 /** What is needed to read the values of a device; null until its description is there. */
 export function useDeviceContext(device: DeviceRef | undefined): DeviceContext | null {
   const t = useTexts();
+  const store = useStore();
+  const describe = useDescriptionQuery();
   const doc = useQuery({
-    ...descriptionQuery(device?.description_id ?? ""),
+    ...describe(device?.description_id ?? ""),
     enabled: device !== undefined,
   }).data;
   return useMemo(() => {
     if (!device || !doc) return null;
     const { slug, node } = device;
-    return { slug, node, doc, t, lookup: (address: string) => rawAt(slug, address) };
-  }, [device, doc, t]);
+    return { slug, node, doc, t, lookup: (address: string) => rawAt(store, slug, address) };
+  }, [device, doc, store, t]);
 }
 
 const MILLI = 1000;

@@ -1,6 +1,6 @@
 import { SegmentedControl } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
-import { turbineQuery } from "../../api/queries";
+import { useTurbineQuery } from "../../api/queries";
 import type { AxisData, StationRef } from "../../api/types";
 import { usePageSearch } from "../../frame/search";
 import { Unconnected } from "../../frame/Unconnected";
@@ -16,13 +16,14 @@ import classes from "./Axis.module.css";
 import { BitPanel } from "./BitPanel";
 import { ErrorHistory } from "./ErrorHistory";
 import { Measurements } from "./Measurements";
+import { MotionPanel } from "./MotionPanel";
 import { Plots } from "./Plots";
 import { StateDiagram } from "./StateDiagram";
 
-/** One axis in full: its state machine, what it measures, its inputs and outputs. Nothing here moves anything. */
+/** One axis in full: its state machine, what it measures, its inputs and outputs, and what moves it. */
 export function AxisPage() {
   const t = useTexts();
-  const query = useQuery(turbineQuery);
+  const query = useQuery(useTurbineQuery());
   const turbine = query.data;
   const [search, update] = usePageSearch();
   const stations = (turbine?.stations ?? []).filter((station) => station.blade !== null);
@@ -41,8 +42,6 @@ export function AxisPage() {
           data-testid="choose-blade"
         />
         <Now station={station} />
-        <span className={room.spacer} />
-        <span className={`${classes.still} dim`}>{t("page.axis.no_motion")}</span>
       </div>
       <Blade key={station.slug} station={station} />
     </div>
@@ -79,8 +78,10 @@ function Blade({ station }: { station: StationRef }) {
   useWatchDevice(pmc?.slug ?? null);
   const contexts = { pmm: useDeviceContext(pmm), pmc: useDeviceContext(pmc) };
   const axis = useAxes().get(station.blade ?? 0);
+  const [{ replay }] = usePageSearch();
   return (
     <div className={`${classes.panels} bench`}>
+      {pmc && replay === undefined && <MotionPanel device={pmc} />}
       <section className={classes.panel} aria-label={t("page.axis.machine")}>
         <h2>{t("page.axis.machine")}</h2>
         <StateDiagram state={axis?.state ?? null} stale={axis?.stale ?? true} />

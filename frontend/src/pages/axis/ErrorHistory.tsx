@@ -10,7 +10,7 @@ import { type Translate, useTexts } from "../../texts/texts";
 import { errorCode } from "../../ui/format";
 import { notify } from "../../ui/notices";
 import { storyOf } from "../../ui/problem";
-import { rawAt, useUnheard } from "../../ui/reading";
+import { useUnheard } from "../../ui/reading";
 import classes from "./Axis.module.css";
 
 const ENTRIES = [1, 2, 3, 4, 5, 6, 7, 8];
@@ -39,7 +39,7 @@ export function ErrorHistory({ device, context }: Props) {
     },
   });
   if (!device || !context) return null;
-  const count = rawAt(slug, COUNT);
+  const count = context.lookup(COUNT);
   const title = t("page.axis.history", { device: device.name });
   return (
     <section
@@ -49,7 +49,7 @@ export function ErrorHistory({ device, context }: Props) {
     >
       <h2>
         {title}
-        <NeedsRole role="technician">
+        <NeedsRole role="technician" device>
           {(locked) => (
             <Button
               variant="default"
@@ -67,13 +67,14 @@ export function ErrorHistory({ device, context }: Props) {
       </h2>
       {typeof count !== "number" && <p className="dim">{t("page.axis.history_unknown")}</p>}
       {count === 0 && <p>{t("page.axis.history_empty")}</p>}
-      {typeof count === "number" && count > 0 && <Entries slug={slug} doc={context.doc} count={count} />}
+      {typeof count === "number" && count > 0 && <Entries context={context} count={count} />}
     </section>
   );
 }
 
-function Entries({ slug, doc, count }: { slug: string; doc: DescriptionDoc; count: number }) {
+function Entries({ context, count }: { context: DeviceContext; count: number }) {
   const t = useTexts();
+  const { doc, lookup } = context;
   return (
     <table className={classes.history}>
       <thead>
@@ -86,8 +87,8 @@ function Entries({ slug, doc, count }: { slug: string; doc: DescriptionDoc; coun
       </thead>
       <tbody>
         {ENTRIES.slice(0, count).map((at) => {
-          const raw = rawAt(slug, entryOf(at));
-          const stamp = rawAt(slug, stampOf(at));
+          const raw = lookup(entryOf(at));
+          const stamp = lookup(stampOf(at));
           const code = typeof raw === "number" ? raw % LOW_WORD : null;
           return (
             <tr key={at}>

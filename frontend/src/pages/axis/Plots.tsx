@@ -4,7 +4,7 @@ import { IconPlayerPause, IconPlayerPlay } from "@tabler/icons-react";
 import { useEffect, useRef, useState } from "react";
 import UPlot from "uplot";
 import { usePageSearch } from "../../frame/search";
-import { store } from "../../live/live";
+import { useStore } from "../../live/live";
 import type { Columns } from "../../live/trace";
 import { localise } from "../../model/values";
 import { useTexts } from "../../texts/texts";
@@ -39,6 +39,7 @@ const PLOTS: readonly Plot[] = [
 export function Plots({ blade }: { blade: number }) {
   const t = useTexts();
   const [search, update] = usePageSearch();
+  const store = useStore();
   const [pausedS, setPausedS] = useState<number | null>(null);
   const span = SPANS.includes(search.span ?? "") ? (search.span ?? "60") : "60";
   return (
@@ -89,6 +90,7 @@ interface OnePlotProps {
 function OnePlot({ plot, blade, spanS, pausedS }: OnePlotProps) {
   const t = useTexts();
   const { language } = t;
+  const store = useStore();
   const holder = useRef<HTMLDivElement>(null);
   const scheme = useComputedColorScheme();
   useEffect(() => {
@@ -113,7 +115,7 @@ function OnePlot({ plot, blade, spanS, pausedS }: OnePlotProps) {
       observer.disconnect();
       drawn.destroy();
     };
-  }, [plot, blade, spanS, pausedS, scheme, language]);
+  }, [plot, blade, store, spanS, pausedS, scheme, language]);
   const title = t(`page.axis.plot.${plot.key}`);
   return (
     <figure className={classes.plot}>

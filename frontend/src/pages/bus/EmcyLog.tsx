@@ -1,6 +1,5 @@
-import { useQuery } from "@tanstack/react-query";
 import { useMemo } from "react";
-import { emergenciesQuery, type EmcyLine } from "../../api/trace";
+import { type EmcyLine, useEmergencies } from "../../api/trace";
 import { usePageSearch } from "../../frame/search";
 import { useTexts } from "../../texts/texts";
 import { DataTable, type TableColumn } from "../../ui/DataTable";
@@ -18,7 +17,7 @@ export function EmcyLog() {
   const t = useTexts();
   const [, update] = usePageSearch();
   const nameOf = useDeviceName();
-  const rows = useQuery(emergenciesQuery).data ?? [];
+  const rows = useEmergencies();
   const columns = useMemo(
     (): TableColumn<EmcyLine>[] => [
       {

@@ -1,6 +1,5 @@
-import { useQuery } from "@tanstack/react-query";
 import { useMemo } from "react";
-import { type BusIdentifier, identifiersQuery } from "../../api/trace";
+import { type BusIdentifier, useIdentifiers } from "../../api/trace";
 import { usePageSearch } from "../../frame/search";
 import { useServerNow } from "../../live/live";
 import { figure } from "../../model/values";
@@ -21,7 +20,7 @@ export function IdentifierTable() {
   const t = useTexts();
   const [, update] = usePageSearch();
   const nameOf = useDeviceName();
-  const rows = useQuery(identifiersQuery).data ?? [];
+  const rows = useIdentifiers();
   const nowMs = useServerNow(NOW_MS);
   const most = Math.max(...rows.map((row) => row.load), 0.001);
   const columns = useMemo((): TableColumn<BusIdentifier>[] => {

@@ -1,5 +1,4 @@
-import { useQuery } from "@tanstack/react-query";
-import { type BusLoadLine, identifiersQuery, loadQuery } from "../../api/trace";
+import { type BusLoadLine, useBusLoad, useIdentifiers } from "../../api/trace";
 import { figure } from "../../model/values";
 import { useTexts } from "../../texts/texts";
 import { placeName, useDeviceOfNode } from "./nodeNames";
@@ -13,7 +12,7 @@ const SHOWN_IDS = 14;
 
 /** Load of each bus second by second, and who makes it. */
 export function LoadView() {
-  const buses = useQuery(loadQuery).data ?? [];
+  const buses = useBusLoad();
   return (
     <div className={`${classes.loads} bench`} data-testid="load-view">
       {buses.map((bus) => (
@@ -26,7 +25,7 @@ export function LoadView() {
 function OneBus({ bus }: { bus: BusLoadLine }) {
   const t = useTexts();
   const deviceOf = useDeviceOfNode();
-  const ids = (useQuery(identifiersQuery).data ?? []).filter((one) => one.bus === bus.bus);
+  const ids = useIdentifiers().filter((one) => one.bus === bus.bus);
   const percent = (share: number) => `${figure(share * 100, 1, t.language)} %`;
   const nodes = Object.entries(bus.nodes).sort(([, a], [, b]) => b - a);
   const numbers = [...new Set(bus.seconds.flatMap((second) => Object.keys(second.nodes)))].map(Number);

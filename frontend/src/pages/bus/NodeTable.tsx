@@ -1,7 +1,6 @@
-import { useQuery } from "@tanstack/react-query";
 import { IconAlertTriangle } from "@tabler/icons-react";
 import { useMemo } from "react";
-import { type BusNode, nodesQuery } from "../../api/trace";
+import { type BusNode, useBusNodes } from "../../api/trace";
 import { usePageSearch } from "../../frame/search";
 import { useServerNow } from "../../live/live";
 import { figure } from "../../model/values";
@@ -20,7 +19,7 @@ export function NodeTable() {
   const t = useTexts();
   const [, update] = usePageSearch();
   const nameOf = useDeviceName();
-  const rows = useQuery(nodesQuery).data ?? [];
+  const rows = useBusNodes();
   const nowMs = useServerNow(NOW_MS);
   const most = Math.max(...rows.map((row) => row.load), 0.001);
   const columns = useMemo((): TableColumn<BusNode>[] => {

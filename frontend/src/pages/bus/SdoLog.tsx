@@ -1,7 +1,6 @@
 import { SegmentedControl } from "@mantine/core";
-import { keepPreviousData, useQuery } from "@tanstack/react-query";
 import { useMemo } from "react";
-import { type SdoLine, transfersQuery } from "../../api/trace";
+import { type SdoLine, useTransfers } from "../../api/trace";
 import { usePageSearch } from "../../frame/search";
 import { figure } from "../../model/values";
 import { useTexts } from "../../texts/texts";
@@ -19,7 +18,7 @@ export function SdoLog() {
   const [search, update] = usePageSearch();
   const nameOf = useDeviceName();
   const which = CHOICES.find((one) => one === search.kind) ?? "writes";
-  const rows = useQuery({ ...transfersQuery(which), placeholderData: keepPreviousData }).data ?? [];
+  const rows = useTransfers(which).data ?? [];
   const columns = useMemo(
     (): TableColumn<SdoLine>[] => [
       {

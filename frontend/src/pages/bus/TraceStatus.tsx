@@ -1,6 +1,6 @@
 import { IconPlayerPause, IconPlayerPlay } from "@tabler/icons-react";
 import { usePageSearch } from "../../frame/search";
-import { useLink } from "../../live/live";
+import { useLink, useShown } from "../../live/live";
 import { figure } from "../../model/values";
 import { type Translate, useTexts } from "../../texts/texts";
 import { timeOfDay } from "../../ui/format";
@@ -11,6 +11,7 @@ import type { useTrace } from "./useTrace";
 /** Says what share of the traffic is on the screen, where it comes from, and how much came since the pause. */
 export function TraceStatus({ trace }: { trace: ReturnType<typeof useTrace> }) {
   const t = useTexts();
+  const { recorded } = useShown();
   const recording = useLink()?.recording.state === "on";
   const [search] = usePageSearch();
   const { view, paused } = trace;
@@ -33,7 +34,7 @@ export function TraceStatus({ trace }: { trace: ReturnType<typeof useTrace> }) {
       {view.source === "recording" && <span>{t("trace.page.from_recording")}</span>}
       <span className={classes.run} data-paused={paused} data-testid="trace-run">
         {paused ? <IconPlayerPause size={14} aria-hidden /> : <IconPlayerPlay size={14} aria-hidden />}
-        {t(paused ? "trace.page.paused" : "trace.page.live")}
+        {t(paused ? "trace.page.paused" : recorded ? "trace.page.at_cursor" : "trace.page.live")}
         {paused && view.arrived > 0 && (
           <em data-testid="trace-arrived">{t("trace.page.paused_hint", { count: view.arrived })}</em>
         )}

@@ -11,9 +11,8 @@ import {
   IconSquareCheck,
   IconTable,
 } from "@tabler/icons-react";
-import { useQuery } from "@tanstack/react-query";
 import { type ReactNode, useEffect, useState } from "react";
-import { nodesQuery } from "../../api/trace";
+import { useBusNodes } from "../../api/trace";
 import { usePageSearch } from "../../frame/search";
 import { useTexts } from "../../texts/texts";
 import { useDeviceName } from "../../ui/devices";
@@ -135,7 +134,7 @@ function NodesMenu() {
   const t = useTexts();
   const [search, update] = usePageSearch();
   const nameOf = useDeviceName();
-  const nodes = useQuery(nodesQuery).data ?? [];
+  const nodes = useBusNodes();
   const choices = nodes.map((one): [string, string] => [
     String(one.node),
     `${String(one.node)}  ${one.device === null ? t("trace.table.foreign") : nameOf(one.device)}`,

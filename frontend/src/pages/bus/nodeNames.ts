@@ -1,12 +1,12 @@
 /** Names of nodes by their number, as the connected turbine has them. */
 import { useQuery } from "@tanstack/react-query";
-import { turbineQuery } from "../../api/queries";
+import { useTurbineQuery } from "../../api/queries";
 import { type Translate, useTexts } from "../../texts/texts";
 import { placesOf, stationName } from "../../ui/devices";
 
 export function useDeviceOfNode(): (node: number) => string | null {
   const t = useTexts();
-  const turbine = useQuery(turbineQuery).data;
+  const turbine = useQuery(useTurbineQuery()).data;
   const places = placesOf(turbine ?? undefined);
   return (node) => {
     const place = places.find((one) => one.device.node === node);

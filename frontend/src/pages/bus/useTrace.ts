@@ -3,7 +3,7 @@ import { useMutation } from "@tanstack/react-query";
 import { useCallback, useEffect, useMemo, useRef } from "react";
 import { digitsOf, fetchFrames, type Side, type TraceFilter, type TraceLine } from "../../api/trace";
 import { usePageSearch } from "../../frame/search";
-import { frames, store, useBench, useFrames, watchTrace } from "../../live/live";
+import { useBench, useFrames, useShown, watchTrace } from "../../live/live";
 import { notify } from "../../ui/notices";
 import { storyOf } from "../../ui/problem";
 import { useTexts } from "../../texts/texts";
@@ -22,6 +22,8 @@ interface Ask {
 export function useTrace() {
   const t = useTexts();
   const [search, update] = usePageSearch();
+  const channel = useShown();
+  const { ctx, frames, store } = channel;
   const view = useFrames();
   const epoch = useBench()?.epoch;
   const { nodes, services, dir, ids, data, q, errors } = search;
@@ -31,7 +33,7 @@ export function useTrace() {
   const paused = search.paused !== undefined || Number.isFinite(wanted);
 
   const { mutate, isPending } = useMutation({
-    mutationFn: ({ side, tNs }: Ask) => fetchFrames(side, tNs, filter, PAGE_ROWS),
+    mutationFn: ({ side, tNs }: Ask) => fetchFrames(ctx, side, tNs, filter, PAGE_ROWS),
     onSuccess: (page, { side, tNs }) => {
       frames.merge(page, WHERE[side]);
       if (side !== "around") return;
@@ -48,8 +50,8 @@ export function useTrace() {
 
   useEffect(() => {
     const at = new URLSearchParams(location.search);
-    return watchTrace(filter, frames.begin(at.has("paused") || at.has("frame")));
-  }, [filter, epoch]);
+    return watchTrace(channel, filter, frames.begin(at.has("paused") || at.has("frame")));
+  }, [channel, frames, filter, epoch]);
 
   // What came before the running trace began, once, exactly up to its first frame; or the moment that is asked for.
   const { startNs } = view;
@@ -66,17 +68,17 @@ export function useTrace() {
   useEffect(() => {
     if (!Number.isFinite(wanted) || startNs === null) return;
     if (!frames.view.rows.some((row) => row.t_ns === wanted)) mutate({ side: "around", tNs: wanted });
-  }, [wanted, startNs, mutate]);
+  }, [frames, wanted, startNs, mutate]);
 
   const pause = useCallback(() => {
     frames.pause();
     update({ paused: "1" });
-  }, [update]);
+  }, [frames, update]);
   const resume = useCallback(() => {
     update({ paused: undefined, frame: undefined });
     frames.resume();
     mutate({ side: "before", tNs: Math.ceil((store.serverNowMs() + AHEAD_MS) * 1e6) });
-  }, [mutate, update]);
+  }, [frames, store, mutate, update]);
 
   const edge = (side: Side, tNs: number | undefined) => {
     if (tNs !== undefined && !isPending) mutate({ side, tNs });

@@ -49,7 +49,7 @@ export function ActiveFaults({ line }: { line: InstructorData }) {
                 count: faults.length,
               })}
             </h2>
-            <NeedsRole role="technician">
+            <NeedsRole role="technician" device>
               {(locked) => (
                 <Button
                   variant="default"
@@ -92,7 +92,7 @@ function FaultRow({ fault, nowMs }: { fault: InjectedFault; nowMs: number }) {
       <span className={classes.where}>{place}</span>
       <span className={classes.age}>{t("page.instructor.since", { age: age(sinceMs, t.language) })}</span>
       <span className={classes.age}>{endText(fault, kind?.momentary ?? false, nowMs, t)}</span>
-      <NeedsRole role="technician">
+      <NeedsRole role="technician" device>
         {(locked) => (
           <Button
             variant="default"
@@ -135,7 +135,7 @@ function PlayingStrip({ playing, nowMs }: { playing: Playing; nowMs: number }) {
       <span className={classes.clock}>
         {clock(doneMs)} / {clock(wholeMs)}
       </span>
-      <NeedsRole role="technician">
+      <NeedsRole role="technician" device>
         {(locked) => (
           <Button
             variant="default"

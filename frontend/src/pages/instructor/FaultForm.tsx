@@ -63,7 +63,7 @@ export function FaultForm({ kind, answering }: { kind: FaultKind; answering: boo
           ))}
         </div>
         <div className={classes.go}>
-          <NeedsRole role="technician">
+          <NeedsRole role="technician" device>
             {(locked) => (
               <Button
                 type="submit"

@@ -85,7 +85,7 @@ function Details({ scenario, line }: { scenario: Scenario; line: InstructorData 
         <dd>{seed}</dd>
       </dl>
       <div className={classes.go}>
-        <NeedsRole role="technician">
+        <NeedsRole role="technician" device>
           {(locked) => (
             <Button
               color="var(--hs-twin)"

@@ -2,7 +2,7 @@ import "uplot/dist/uPlot.min.css";
 import { useComputedColorScheme } from "@mantine/core";
 import { useEffect, useRef } from "react";
 import UPlot from "uplot";
-import { store } from "../../live/live";
+import { useStore } from "../../live/live";
 import { TRACE_S } from "../../live/trace";
 import { useTexts } from "../../texts/texts";
 import { localise } from "../../model/values";
@@ -17,6 +17,7 @@ const LEAST_SPAN_DEG = 4;
 export function AngleTrace({ blade, label }: { blade: number; label: string }) {
   const t = useTexts();
   const { language } = t;
+  const store = useStore();
   const holder = useRef<HTMLDivElement>(null);
   const scheme = useComputedColorScheme();
   useEffect(() => {
@@ -27,7 +28,11 @@ export function AngleTrace({ blade, label }: { blade: number; label: string }) {
       return found ? [found.times, found.positions, found.demands] : [[], [], []];
     };
     const plot = new UPlot(
-      options(element, (text) => localise(text, language)),
+      options(
+        element,
+        () => store.serverNowMs() / 1000,
+        (text) => localise(text, language),
+      ),
       columns(),
       element,
     );
@@ -39,11 +44,11 @@ export function AngleTrace({ blade, label }: { blade: number; label: string }) {
       observer.disconnect();
       plot.destroy();
     };
-  }, [blade, scheme, language]);
+  }, [blade, store, scheme, language]);
   return <div ref={holder} className={classes.trace} role="img" aria-label={label} />;
 }
 
-function options(element: HTMLElement, show: (text: string) => string): UPlot.Options {
+function options(element: HTMLElement, nowS: () => number, show: (text: string) => string): UPlot.Options {
   const style = getComputedStyle(element);
   const colour = (name: string) => style.getPropertyValue(name).trim();
   const axis: UPlot.Axis = {
@@ -58,7 +63,7 @@ function options(element: HTMLElement, show: (text: string) => string): UPlot.Op
     cursor: { show: false },
     padding: [6, 14, 0, 0],
     scales: {
-      x: { time: false, range: () => windowNow() },
+      x: { time: false, range: () => [nowS() - TRACE_S, nowS()] },
       y: { range: (_plot, low, high) => spanOf(low, high) },
     },
     axes: [
@@ -93,11 +98,6 @@ function degrees(splits: number[], show: (text: string) => string): string[] {
 
 function sizeOf(element: HTMLElement): { width: number; height: number } {
   return { width: element.clientWidth, height: element.clientHeight };
-}
-
-function windowNow(): [number, number] {
-  const now = store.serverNowMs() / 1000;
-  return [now - TRACE_S, now];
 }
 
 function spanOf(low: number | null, high: number | null): [number, number] {

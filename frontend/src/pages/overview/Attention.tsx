@@ -8,10 +8,10 @@ import {
 import { useQueries, useQuery } from "@tanstack/react-query";
 import { Link } from "@tanstack/react-router";
 import { useState } from "react";
-import { descriptionQuery, turbineQuery } from "../../api/queries";
+import { useDescriptionQuery, useTurbineQuery } from "../../api/queries";
 import type { Turbine } from "../../api/types";
 import { type PageSearch, roomSearch } from "../../frame/search";
-import { store, useAxes, useHearing, useLink, useNodes, useServerNow } from "../../live/live";
+import { useAxes, useHearing, useLink, useNodes, useServerNow, useStore } from "../../live/live";
 import { type Translate, useTexts } from "../../texts/texts";
 import { placesOf } from "../../ui/devices";
 import { rawAt } from "../../ui/reading";
@@ -26,7 +26,7 @@ const SHOWN = 5;
 export function Attention() {
   const t = useTexts();
   const [all, setAll] = useState(false);
-  const turbine = useQuery(turbineQuery).data;
+  const turbine = useQuery(useTurbineQuery()).data;
   const nowMs = useServerNow(REFRESH_MS);
   const hearing = useHearing().state === "hearing";
   const link = useLink();
@@ -69,14 +69,16 @@ export function Attention() {
 
 /** The turbine's devices with what the socket told of them. */
 function useWatched(turbine: Turbine | undefined, t: Translate): Watched[] {
+  const store = useStore();
+  const describe = useDescriptionQuery();
   const places = placesOf(turbine);
   const ids = [...new Set(places.map(({ device }) => device.description_id))];
-  const docs = useQueries({ queries: ids.map((id) => descriptionQuery(id)) });
+  const docs = useQueries({ queries: ids.map((id) => describe(id)) });
   return places.flatMap(({ station, device: { slug, node, description_id } }): Watched[] => {
     const doc = docs[ids.indexOf(description_id)]?.data;
     const cells = store.cells(slug);
     if (!doc || !cells || station.blade === null) return [];
-    const lookup = (address: string) => rawAt(slug, address);
+    const lookup = (address: string) => rawAt(store, slug, address);
     return [{ station, context: { slug, node, doc, t, lookup }, cells }];
   });
 }

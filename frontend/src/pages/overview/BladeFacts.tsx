@@ -4,7 +4,7 @@ import { useDeviceVersion } from "../../live/live";
 import type { DeviceContext } from "../../model/shown";
 import { useTexts } from "../../texts/texts";
 import { ReadingText } from "../../ui/ReadingText";
-import { rawAt, useReading, useUnheard } from "../../ui/reading";
+import { useReading, useUnheard } from "../../ui/reading";
 import {
   bitState,
   LIMIT_SWITCHES,
@@ -70,8 +70,8 @@ export function BladeFacts({ pmm, pmc }: Contexts) {
 function TemperatureLine({ spot, context }: { spot: Temperature; context: DeviceContext | null }) {
   const t = useTexts();
   useDeviceVersion(context?.slug ?? "");
-  const limit = (address: string) => (context ? rawAt(context.slug, address) : null);
-  const tone = context ? temperatureTone(rawAt(context.slug, spot.address), spot, limit) : undefined;
+  const limit = (address: string) => context?.lookup(address) ?? null;
+  const tone = context ? temperatureTone(context.lookup(spot.address), spot, limit) : undefined;
   const Icon = tone === "error" ? IconAlertOctagon : IconAlertTriangle;
   return (
     <div className={classes.temperature}>

@@ -46,8 +46,9 @@ function linkFindings(link: LinkData | null): Finding[] {
   if (link.state !== "connected") add("error", `link_${link.state}`, { reason: link.reason });
   if (link.recording.state === "stopped")
     add("error", "recording_stopped", { text_key_reason: link.recording.reason });
-  // While nothing is connected there is nothing to record.
-  if (link.recording.state === "off" && link.state !== "disconnected") add("warning", "recording_off");
+  // While nothing is connected there is nothing to record, and a recording is not recorded again.
+  const recordable = link.state !== "disconnected" && link.mode !== "replay";
+  if (link.recording.state === "off" && recordable) add("warning", "recording_off");
   if (link.recording.lost > 0) add("error", "recording_lost", { lost: link.recording.lost });
   if (link.dropped > 0) add("error", "frames_dropped", { dropped: link.dropped });
   if (link.other_masters.length > 0) add("warning", "other_masters");

@@ -3,7 +3,7 @@ import type { BitDoc, Raw } from "../../api/types";
 import { fieldOf } from "../../model/bits";
 import type { DeviceContext } from "../../model/shown";
 import type { Pace } from "../../ui/reading";
-import { entriesOf, rawAt } from "../../ui/reading";
+import { entriesOf } from "../../ui/reading";
 
 export const PMM = "oat-pmm";
 export const PMC = "oat-pmc";
@@ -142,7 +142,7 @@ export function bitState(context: DeviceContext, address: string, name: string):
   if (!entry?.bits) return null;
   const bit = context.doc.bit_tables[entry.bits]?.find((one) => one.name === name);
   if (!bit) return null;
-  const raw = rawAt(context.slug, address);
+  const raw = context.lookup(address);
   return { bit, set: typeof raw === "number" ? fieldOf(entry, raw, bit) !== 0 : null };
 }
 

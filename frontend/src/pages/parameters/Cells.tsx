@@ -147,8 +147,9 @@ function DefaultCell({ entry, device }: { entry: EntryDoc; device: DeviceContext
 
 /** When, who, from what; of several devices the latest. */
 function ChangedCell({ address, t }: { address: string; t: Texts }) {
-  const { devices, side, nameOf } = useBenchOfTable();
-  const last = lastChangeOf(address, devices);
+  const bench = useBenchOfTable();
+  const { side, nameOf } = bench;
+  const last = lastChangeOf(address, bench);
   if (last === null) return <span className="dim">{DASH}</span>;
   const details = { ...detailsOf(last.change, t), device: nameOf(last.slug) };
   return (

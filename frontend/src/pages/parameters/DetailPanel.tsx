@@ -18,10 +18,10 @@ interface Props {
 /** Everything about one parameter beside the table, and its editor where it may be written. */
 export function DetailPanel({ row, onDevice, onOpen, onClose }: Props) {
   const { t, slug } = useDevice();
-  const { role, side, devices, nameOf } = useBenchOfTable();
+  const { role, recorded, side, devices, nameOf } = useBenchOfTable();
   const panel = useRef<HTMLElement>(null);
   const { entry, title } = row;
-  const lock = lockOf(entry, role);
+  const lock = lockOf(entry, role, recorded);
   useEffect(() => {
     const first = panel.current?.querySelector<HTMLElement>("[data-autofocus]");
     (first ?? panel.current)?.focus({ preventScroll: true });

@@ -16,12 +16,12 @@ enum Dialog {
 /** Reading is for all that is shown; a save or a restart is always for one device, the one that was picked. */
 export function DeviceActions() {
   const t = useTexts();
-  const { role, side } = useBenchOfTable();
+  const { role, recorded, side } = useBenchOfTable();
   const { slug, doc } = useDevice();
   const silent = useSilent(slug);
   const [dialog, setDialog] = useState<Dialog | null>(null);
   const close = () => setDialog(null);
-  const barred = silent || role === "viewer";
+  const barred = recorded || silent || role === "viewer";
   return (
     <div className={classes.icons}>
       <ReadAllButton />
@@ -57,7 +57,7 @@ export function DeviceActions() {
 
 function ReadAllButton() {
   const t = useTexts();
-  const { role, devices } = useBenchOfTable();
+  const { role, recorded, devices } = useBenchOfTable();
   const { slug } = useDevice();
   const reading = useReadAll(slug);
   const readMany = useReadMany();
@@ -67,7 +67,7 @@ function ReadAllButton() {
       px="sm"
       variant="default"
       leftSection={<IconRefresh size={17} aria-hidden />}
-      disabled={(silent && devices.length === 1) || reading.running || role === "viewer"}
+      disabled={recorded || (silent && devices.length === 1) || reading.running || role === "viewer"}
       onClick={() => readMany(devices.map((one) => one.slug))}
       data-testid="read-all"
     >

@@ -1,10 +1,10 @@
-import { Alert, Button, Group, Loader, Modal, Stack, Text } from "@mantine/core";
+import { Alert, Button, Group, Loader, Stack, Text } from "@mantine/core";
 import { IconAlertTriangle, IconCircleCheck } from "@tabler/icons-react";
 import { useMutation } from "@tanstack/react-query";
 import type { ReactNode } from "react";
 import { commands } from "../../api/client";
 import type { EntryDoc } from "../../api/types";
-import { store, useDeviceVersion } from "../../live/live";
+import { useDeviceVersion, useStore } from "../../live/live";
 import { figure } from "../../model/values";
 import { titleOf } from "../../model/rows";
 import { useTexts } from "../../texts/texts";
@@ -13,6 +13,7 @@ import { HoldButton } from "../../ui/HoldButton";
 import { ProblemAlert } from "../../ui/ProblemAlert";
 import { isStoredUnknown, isUnsaved } from "./cellValue";
 import { useDevice } from "./context";
+import { Dialog } from "../../ui/Dialog";
 
 interface Props {
   entries: readonly EntryDoc[];
@@ -61,13 +62,7 @@ function CommandDialog({ name, tone, run, warning, onClose }: CommandProps) {
   const command = useMutation({ mutationFn: () => run(slug) });
   const key = (part: string) => `page.${name}.${part}`;
   return (
-    <Modal
-      opened
-      onClose={onClose}
-      title={<Text fw={700}>{t(key("title"), { device })}</Text>}
-      closeButtonProps={{ "aria-label": t("page.close") }}
-      size="lg"
-    >
+    <Dialog opened onClose={onClose} title={<Text fw={700}>{t(key("title"), { device })}</Text>} size="lg">
       <Stack gap="md">
         <Text>{t(key("explain"), { device })}</Text>
         {command.isIdle && warning}
@@ -105,7 +100,7 @@ function CommandDialog({ name, tone, run, warning, onClose }: CommandProps) {
           )}
         </Group>
       </Stack>
-    </Modal>
+    </Dialog>
   );
 }
 
@@ -113,6 +108,7 @@ function CommandDialog({ name, tone, run, warning, onClose }: CommandProps) {
 function UnsavedList({ entries, name }: { entries: readonly EntryDoc[]; name: "save" | "restart" }) {
   const t = useTexts();
   const { slug } = useDevice();
+  const store = useStore();
   useDeviceVersion(slug);
   const unsaved = entries.filter((entry) => isUnsaved(entry, store.cell(slug, entry.address)));
   const unknown = entries.some((entry) => isStoredUnknown(entry, store.cell(slug, entry.address)));

@@ -87,12 +87,15 @@ const MOST_CHANGES = 20;
 
 function History({ entry }: { entry: EntryDoc }) {
   const { t } = useDevice();
-  const { devices, nameOf } = useBenchOfTable();
-  const found = useQueries({ queries: devices.map(({ slug }) => historyQuery(slug, entry.address)) });
+  const { devices, recorded, nameOf } = useBenchOfTable();
+  const found = useQueries({
+    queries: recorded ? [] : devices.map(({ slug }) => historyQuery(slug, entry.address)),
+  });
   const changes = devices
     .flatMap(({ slug }, at) => (found[at]?.data ?? []).map((change) => ({ slug, change })))
     .sort((a, b) => b.change.t_ns - a.change.t_ns)
     .slice(0, MOST_CHANGES);
+  if (recorded) return null;
   return (
     <section data-testid="history">
       <h3>{t("page.history.title")}</h3>

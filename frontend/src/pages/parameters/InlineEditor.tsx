@@ -1,11 +1,9 @@
 import { IconCheck, IconX } from "@tabler/icons-react";
 import { type KeyboardEvent, useEffect, useRef, useState } from "react";
 import type { EntryDoc } from "../../api/types";
-import { store } from "../../live/live";
 import { quantityOf, isHex, show } from "../../model/values";
 import { isBroken, lineOfFinding } from "../../model/ruleFindings";
 import type { DeviceContext } from "../../model/shown";
-import { rawOf } from "./cellValue";
 import { useDraft } from "./draft";
 import { useFindingsOf } from "./rules";
 import classes from "./Parameters.module.css";
@@ -21,7 +19,7 @@ interface Props {
 export function InlineEditor({ entry, device, onDone }: Props) {
   const { t, slug, lookup } = device;
   const [start] = useState(() => {
-    const raw = staged.get(slug, entry.address)?.raw ?? rawOf(store.cell(slug, entry.address));
+    const raw = staged.get(slug, entry.address)?.raw ?? lookup(entry.address);
     return raw === null ? "" : show(entry, raw, lookup, t.language);
   });
   const draft = useDraft(entry, device, start);

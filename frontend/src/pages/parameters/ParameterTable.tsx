@@ -141,20 +141,21 @@ export const ParameterTable = memo(function ParameterTable(props: Props) {
 
 /** A number is edited where it stands; everything else opens its details. */
 function useEdit(
-  { role, devices }: ReturnType<typeof useBenchOfTable>,
+  { role, recorded, devices }: ReturnType<typeof useBenchOfTable>,
   lines: readonly Line[],
   onOpen: (address: string, slug: string) => void,
   begin: (editing: Editing) => void,
 ): (address: string, slug: string) => void {
-  const latest = useRef({ lines, role, onOpen });
+  const latest = useRef({ lines, role, recorded, onOpen });
   useEffect(() => {
-    latest.current = { lines, role, onOpen };
+    latest.current = { lines, role, recorded, onOpen };
   });
   const first = devices[0];
   return useMemo(
     () => (address, slug) => {
       const entry = first?.doc.entries.find((one) => one.address === address);
-      if (entry && isInline(entry) && lockOf(entry, latest.current.role) === null) begin({ address, slug });
+      const { role: now, recorded: shut } = latest.current;
+      if (entry && isInline(entry) && lockOf(entry, now, shut) === null) begin({ address, slug });
       else latest.current.onOpen(address, slug);
     },
     [first, begin],

@@ -1,11 +1,11 @@
 import { Center, Loader } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { useEffect, useMemo } from "react";
-import { descriptionQuery, sessionQuery, turbineQuery } from "../../api/queries";
+import { sessionQuery, useDescriptionQuery, useTurbineQuery } from "../../api/queries";
 import type { DescriptionDoc } from "../../api/types";
 import { usePageSearch } from "../../frame/search";
 import { Unconnected } from "../../frame/Unconnected";
-import { useWatchDevice } from "../../live/live";
+import { useShown, useWatchDevice } from "../../live/live";
 import { useTexts } from "../../texts/texts";
 import { placesOf, type Place, stationName } from "../../ui/devices";
 import { ProblemAlert } from "../../ui/ProblemAlert";
@@ -17,6 +17,7 @@ import { useFavourites } from "./favourites";
 import classes from "./Parameters.module.css";
 import { PendingBar } from "./PendingBar";
 import { ReviewDialog } from "./ReviewDialog";
+import { ReplayLock } from "./ReplayLock";
 import { RuleButton, RuleOverview } from "./RuleOverview";
 import { JudgedContext, useJudged } from "./rules";
 import { type Selection, selectionOf } from "./selection";
@@ -27,23 +28,25 @@ import { useFinishWriting } from "./writing";
 export function ParametersPage() {
   const t = useTexts();
   const [search, update] = usePageSearch();
-  const turbine = useQuery(turbineQuery);
+  const turbine = useQuery(useTurbineQuery());
   const places = useMemo(() => placesOf(turbine.data), [turbine.data]);
   const selection = useMemo(
     () => selectionOf(places, search.device, search.view),
     [places, search.device, search.view],
   );
+  const describe = useDescriptionQuery();
   const description = useQuery({
-    ...descriptionQuery(selection?.kind.descriptionId ?? ""),
+    ...describe(selection?.kind.descriptionId ?? ""),
     enabled: selection !== null,
   });
+  const { recorded } = useShown();
   const slug = turbine.data?.slug;
   useEffect(() => {
-    if (slug !== undefined) staged.open(slug);
-  }, [slug]);
+    if (slug !== undefined && !recorded) staged.open(slug);
+  }, [slug, recorded]);
   useFinishWriting();
   const error = turbine.error ?? description.error;
-  const judged = useJudged(selection !== null);
+  const judged = useJudged(selection !== null && !recorded);
   return (
     <JudgedContext value={judged}>
       <div className={classes.page}>
@@ -54,8 +57,8 @@ export function ParametersPage() {
               selection={selection}
               onPick={(device, side) => update({ device, view: side ? "side" : undefined })}
             />
-            <PendingBar />
-            <RuleButton />
+            {recorded ? <ReplayLock /> : <PendingBar />}
+            {!recorded && <RuleButton />}
           </div>
         )}
         {error && <ProblemAlert error={error} title={t("page.table.not_loaded")} />}
@@ -68,7 +71,7 @@ export function ParametersPage() {
             <Loader aria-label={t("page.loading")} />
           </Center>
         )}
-        {search.findings === "open" && (
+        {search.findings === "open" && !recorded && (
           <RuleOverview places={places} onClose={() => update({ findings: undefined })} />
         )}
       </div>
@@ -88,7 +91,11 @@ function Room({ places, selection, doc }: RoomProps) {
   const role = useQuery(sessionQuery).data?.role ?? "viewer";
   const { starred, toggleStar } = useFavourites(doc.id);
   const { kind, active, side } = selection;
-  const siblings = useMemo(() => kind.places.map((place) => contextOf(place, doc, t)), [kind, doc, t]);
+  const { store, recorded } = useShown();
+  const siblings = useMemo(
+    () => kind.places.map((place) => contextOf(place, doc, t, store)),
+    [kind, doc, t, store],
+  );
   const activeSlug = active.device.slug;
   const device = siblings.find((one) => one.slug === activeSlug) ?? siblings[0];
   const bench = useMemo<Bench>(
@@ -96,6 +103,8 @@ function Room({ places, selection, doc }: RoomProps) {
       devices: side ? siblings : siblings.filter((one) => one.slug === activeSlug),
       siblings,
       side,
+      store,
+      recorded,
       role,
       starred,
       toggleStar,
@@ -104,7 +113,7 @@ function Room({ places, selection, doc }: RoomProps) {
         return place ? stationName(place.station, t) : slug;
       },
     }),
-    [siblings, side, activeSlug, role, starred, toggleStar, kind, t],
+    [siblings, side, activeSlug, store, recorded, role, starred, toggleStar, kind, t],
   );
   if (!device) return null;
   return (
@@ -114,7 +123,7 @@ function Room({ places, selection, doc }: RoomProps) {
           <Watch key={slug} slug={slug} />
         ))}
         <Dictionary key={side ? doc.id : activeSlug} />
-        {search.review === "open" && (
+        {search.review === "open" && !recorded && (
           <ReviewDialog places={places} onClose={() => update({ review: undefined })} />
         )}
       </DeviceContextOfTable>

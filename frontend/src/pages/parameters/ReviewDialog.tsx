@@ -1,10 +1,11 @@
-import { Modal, Text } from "@mantine/core";
+import { Text } from "@mantine/core";
 import { useTexts } from "../../texts/texts";
 import type { Place } from "../../ui/devices";
 import { ReviewList } from "./ReviewList";
 import { useStaged } from "./staging";
 import { Outcome, Progress } from "./WriteProgress";
 import { staged } from "./staging";
+import { Dialog } from "../../ui/Dialog";
 
 interface Props {
   places: readonly Place[];
@@ -21,13 +22,12 @@ export function ReviewDialog({ places, onClose }: Props) {
     onClose();
   };
   return (
-    <Modal
+    <Dialog
       opened
       onClose={close}
       closeOnClickOutside={false}
       size={860}
       title={<Text fw={700}>{t(`page.review.title.${stepName}`)}</Text>}
-      closeButtonProps={{ "aria-label": t("page.close") }}
       data-testid="review-dialog"
     >
       {writing !== null && <Progress writing={writing} places={places} onClose={close} />}
@@ -35,6 +35,6 @@ export function ReviewDialog({ places, onClose }: Props) {
         <Outcome outcome={outcome} places={places} onClose={close} onRest={() => staged.dismiss()} />
       )}
       {writing === null && outcome === null && <ReviewList places={places} onClose={close} />}
-    </Modal>
+    </Dialog>
   );
 }

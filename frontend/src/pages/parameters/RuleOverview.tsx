@@ -1,4 +1,4 @@
-import { Alert, Button, Modal, Stack, Text } from "@mantine/core";
+import { Alert, Button, Stack, Text } from "@mantine/core";
 import {
   IconAlertTriangle,
   IconCircleCheck,
@@ -15,6 +15,7 @@ import { type Place, stationName } from "../../ui/devices";
 import { RuleFindingList } from "./RuleFindingList";
 import { JudgedContext } from "./rules";
 import classes from "./Rules.module.css";
+import { Dialog } from "../../ui/Dialog";
 
 const WEIGHTS = [
   { severity: "error", Icon: IconCircleX },
@@ -67,12 +68,11 @@ export function RuleOverview({ places, onClose }: { places: readonly Place[]; on
   const { stations, error } = useContext(JudgedContext);
   const jump = (device: string, edit: string) => update({ device, edit, findings: undefined, q: undefined });
   return (
-    <Modal
+    <Dialog
       opened
       onClose={onClose}
       size={860}
       title={<Text fw={700}>{t("page.rules.title")}</Text>}
-      closeButtonProps={{ "aria-label": t("page.close") }}
       data-testid="rules-dialog"
     >
       <Stack gap="lg">
@@ -88,7 +88,7 @@ export function RuleOverview({ places, onClose }: { places: readonly Place[]; on
           <Station key={one.station} station={one} places={places} onJump={jump} />
         ))}
       </Stack>
-    </Modal>
+    </Dialog>
   );
 }
 

@@ -2,7 +2,8 @@ import { Alert, Button, Progress } from "@mantine/core";
 import { IconAlertTriangle, IconChevronDown, IconClockOff, IconRefresh } from "@tabler/icons-react";
 import { useMemo } from "react";
 import type { EntryDoc, Job } from "../../api/types";
-import { store, useNodes, useServerNow } from "../../live/live";
+import { useNodes, useServerNow, useShown } from "../../live/live";
+import type { Cell } from "../../live/store";
 import { useTexts } from "../../texts/texts";
 import { age } from "../../ui/format";
 import { heartbeatOf } from "../overview/nodes";
@@ -105,43 +106,55 @@ function Silent({ slug, name }: { slug: string; name: string | null }) {
 function Missing({ slug, reading, name }: { slug: string; reading: ReadAll; name: string | null }) {
   const t = useTexts();
   const { doc } = useDevice();
+  const { store, recorded } = useShown();
   const slugs = useMemo(() => [slug], [slug]);
   const version = useCoarseVersion(slugs);
   const refused = reading.job?.failed;
   const missing = useMemo(
-    () => missingOf(doc.entries, slug, new Set(refused?.map((failure) => failure.address))),
+    () =>
+      missingOf(
+        doc.entries,
+        (address) => store.cell(slug, address),
+        new Set(refused?.map((failure) => failure.address)),
+      ),
     // The store is read afresh whenever values of the device came.
     // eslint-disable-next-line react-hooks/exhaustive-deps
-    [doc, slug, version, refused],
+    [doc, store, slug, version, refused],
   );
   if (version === 0 || missing.length === 0) return null;
   const all = doc.entries.filter((entry) => entry.readable).length;
   return (
     <div className={classes.reading} data-testid="missing">
-      <span>{of(name, t("page.read.missing", { missing: missing.length, all }))}</span>
-      <Button
-        leftSection={<IconRefresh size={17} aria-hidden />}
-        onClick={() => reading.start(missing.length === all ? null : missing)}
-        data-testid="read-missing"
-      >
-        {t("page.read.now")}
-      </Button>
+      <span>
+        {of(name, t(`page.read.${recorded ? "unseen" : "missing"}`, { missing: missing.length, all }))}
+      </span>
+      {!recorded && (
+        <Button
+          leftSection={<IconRefresh size={17} aria-hidden />}
+          onClick={() => reading.start(missing.length === all ? null : missing)}
+          data-testid="read-missing"
+        >
+          {t("page.read.now")}
+        </Button>
+      )}
     </div>
   );
 }
 
-function missingOf(entries: readonly EntryDoc[], slug: string, refused: ReadonlySet<string>): string[] {
+type CellOf = (address: string) => Cell | undefined;
+
+function missingOf(entries: readonly EntryDoc[], cellOf: CellOf, refused: ReadonlySet<string>): string[] {
   return entries
-    .filter((entry) => entry.readable && store.cell(slug, entry.address)?.known !== true)
+    .filter((entry) => entry.readable && cellOf(entry.address)?.known !== true)
     .map((entry) => entry.address)
-    .filter((address) => !refused.has(address) && !isEmptyError(address, slug));
+    .filter((address) => !refused.has(address) && !isEmptyError(address, cellOf));
 }
 
 const ERROR_FIELD = /^1003:([0-9A-F]{2})$/i;
 
 /** An error history that is shorter than its object has nothing to read (CiA 301, 7.5.2.4): its sub 0 counts it. */
-function isEmptyError(address: string, slug: string): boolean {
+function isEmptyError(address: string, cellOf: CellOf): boolean {
   const sub = ERROR_FIELD.exec(address)?.[1];
-  const count = rawOf(store.cell(slug, "1003"));
+  const count = rawOf(cellOf("1003"));
   return sub !== undefined && typeof count === "number" && Number.parseInt(sub, 16) > count;
 }

@@ -33,14 +33,14 @@ export interface ValueCellProps {
 /** A value of one device: what RAM holds, how far it is kept, and what is pending. */
 export function ValueCell(props: ValueCellProps) {
   const { row, device, onEdit } = props;
-  const { side, role, nameOf } = useBenchOfTable();
+  const { side, role, recorded, nameOf } = useBenchOfTable();
   const { entry, title } = row;
   const cell = useCell(device.slug, entry.address);
   const change = useChange(device.slug, entry.address);
   if (props.editing)
     return <InlineEditor key={entry.address} entry={entry} device={device} onDone={props.onEdited} />;
   const { t } = device;
-  const open = lockOf(entry, role) === null;
+  const open = lockOf(entry, role, recorded) === null;
   const name = side ? `${title}, ${nameOf(device.slug)}` : title;
   const id = `ram-${device.slug}-${entry.address}`;
   return (

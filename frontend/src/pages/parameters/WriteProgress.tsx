@@ -3,7 +3,7 @@ import { IconArrowBackUp, IconPlayerStop } from "@tabler/icons-react";
 import { useMutation } from "@tanstack/react-query";
 import { commands, Problem } from "../../api/client";
 import type { Failure, Job, JobRow, Raw } from "../../api/types";
-import { store, useAxes } from "../../live/live";
+import { useAxes, useNodes } from "../../live/live";
 import { titleOf } from "../../model/rows";
 import { type DeviceContext, lineOf, shownOf } from "../../model/shown";
 import { keyOf, type Outcome as Ended, type Writing } from "../../model/staged";
@@ -194,7 +194,7 @@ function Row({ row, raw, context, device }: RowProps) {
 /** What happened, the state that the device is in now, what to do next; names and codes in the details. */
 function Why({ failure, device, t }: { failure: Failure; device: string; t: Translate }) {
   const axes = useAxes();
-  const node = store.nodes.get(device);
+  const node = useNodes().get(device);
   const blade = node ? [...axes.values()].find((axis) => device.startsWith(`${axis.station}/`)) : undefined;
   const state = blade?.state ?? null;
   const story = storyOf(

@@ -1,6 +1,5 @@
 /** The columns of the parameter table: how wide, how sorted, and what text they give to copy and export. */
 import type { Raw } from "../../api/types";
-import { store } from "../../live/live";
 import type { ParameterRow } from "../../model/rows";
 import { type DeviceContext, limitText, lineOf, shownOf } from "../../model/shown";
 import { defaultOf, quantityOf } from "../../model/values";
@@ -120,7 +119,7 @@ export function sortRows(
 
 function sortKey({ column, device }: ColumnSpec, row: ParameterRow, bench: Bench): Raw | null {
   const { entry } = row;
-  const cell = store.cell(device.slug, entry.address);
+  const cell = bench.store.cell(device.slug, entry.address);
   switch (column) {
     case Column.Star:
       return bench.starred.has(entry.address) ? 0 : 1;
@@ -141,7 +140,7 @@ function sortKey({ column, device }: ColumnSpec, row: ParameterRow, bench: Bench
     case Column.Access:
       return entry.access;
     case Column.Changed:
-      return lastChangeOf(entry.address, bench.devices)?.change.t_ns ?? null;
+      return lastChangeOf(entry.address, bench)?.change.t_ns ?? null;
     case Column.Section:
       return entry.section;
   }
@@ -159,7 +158,7 @@ export function compareRaw(a: Raw | null, b: Raw | null): number {
 /** Text of a cell for the clipboard and for files. */
 export function cellText({ column, device }: ColumnSpec, row: ParameterRow, bench: Bench): string {
   const { entry } = row;
-  const cell = store.cell(device.slug, entry.address);
+  const cell = bench.store.cell(device.slug, entry.address);
   const line = (raw: Raw | null) => (raw === null ? "" : lineOf(shownOf(entry, raw, device)));
   switch (column) {
     case Column.Star:
@@ -171,7 +170,11 @@ export function cellText({ column, device }: ColumnSpec, row: ParameterRow, benc
     case Column.Unit:
       return quantityOf(entry, device.lookup).unit;
     case Column.Ram:
-      return ramText(line, rawOf(cell), staged.get(device.slug, entry.address)?.raw);
+      return ramText(
+        line,
+        rawOf(cell),
+        bench.recorded ? undefined : staged.get(device.slug, entry.address)?.raw,
+      );
     case Column.Stored:
       return line(cell?.stored?.raw ?? null);
     case Column.Default:
@@ -193,6 +196,6 @@ function ramText(line: (raw: Raw | null) => string, ram: Raw | null, pending: Ra
 }
 
 function lastChangeText(address: string, bench: Bench): string {
-  const last = lastChangeOf(address, bench.devices);
+  const last = lastChangeOf(address, bench);
   return last === null ? "" : `${new Date(last.change.t_ns / 1e6).toISOString()} ${last.change.person}`;
 }

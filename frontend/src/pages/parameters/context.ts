@@ -1,5 +1,6 @@
 import { createContext, useContext } from "react";
 import type { Session } from "../../api/types";
+import type { LiveStore } from "../../live/store";
 import type { DeviceContext } from "../../model/shown";
 
 /** The device whose values a component shows. */
@@ -18,6 +19,10 @@ export interface Bench {
   /** All devices of this kind of the turbine, the shown ones among them. */
   siblings: readonly DeviceContext[];
   side: boolean;
+  /** What is known of their values. */
+  store: LiveStore;
+  /** What is shown is a recording: nothing can be read, changed or saved. */
+  recorded: boolean;
   role: Session["role"];
   /** Short name of a device among its siblings: "Blade 2". */
   nameOf: (slug: string) => string;

@@ -1,15 +1,16 @@
 /** Device contexts for dialogs that are about many devices, of kinds that the table may not show. */
 import { useQueries } from "@tanstack/react-query";
 import { useMemo } from "react";
-import { descriptionQuery } from "../../api/queries";
+import { useDescriptionQuery } from "../../api/queries";
 import type { DescriptionDoc } from "../../api/types";
-import { store } from "../../live/live";
+import { useStore } from "../../live/live";
+import type { LiveStore } from "../../live/store";
 import type { DeviceContext } from "../../model/shown";
 import { type Translate, useTexts } from "../../texts/texts";
 import type { Place } from "../../ui/devices";
 import { rawOf } from "./cellValue";
 
-export function contextOf(place: Place, doc: DescriptionDoc, t: Translate): DeviceContext {
+export function contextOf(place: Place, doc: DescriptionDoc, t: Translate, store: LiveStore): DeviceContext {
   const { slug, node } = place.device;
   return { slug, node, doc, t, lookup: (address) => rawOf(store.cell(slug, address)) };
 }
@@ -17,17 +18,19 @@ export function contextOf(place: Place, doc: DescriptionDoc, t: Translate): Devi
 /** The devices whose description is loaded, by slug. */
 export function useContexts(places: readonly Place[]): ReadonlyMap<string, DeviceContext> {
   const t = useTexts();
+  const store = useStore();
+  const describe = useDescriptionQuery();
   const ids = [...new Set(places.map((one) => one.device.description_id))];
   const docs = useQueries({
-    queries: ids.map((id) => descriptionQuery(id)),
+    queries: ids.map((id) => describe(id)),
     combine: (results) => results.map((one) => one.data),
   });
   return useMemo(() => {
     const found = new Map<string, DeviceContext>();
     for (const place of places) {
       const doc = docs.find((one) => one?.id === place.device.description_id);
-      if (doc) found.set(place.device.slug, contextOf(place, doc, t));
+      if (doc) found.set(place.device.slug, contextOf(place, doc, t, store));
     }
     return found;
-  }, [places, docs, t]);
+  }, [places, docs, t, store]);
 }

@@ -4,10 +4,10 @@ import { useEffect } from "react";
 import { get } from "../../api/client";
 import { queryClient } from "../../api/queries";
 import type { Details, ParameterChange, ParameterChanges } from "../../api/types";
-import { store } from "../../live/live";
-import type { DeviceContext } from "../../model/shown";
+import { useShown } from "../../live/live";
 import type { Translate } from "../../texts/texts";
 import { dateAndTime } from "../../ui/format";
+import type { Bench } from "./context";
 
 const keyOf = (slug: string) => ["changes", slug];
 const pathOf = (slug: string) => `/api/live/devices/${slug}/changes`;
@@ -32,9 +32,10 @@ export interface LastChange {
   change: ParameterChange;
 }
 
-/** The latest change among the devices shown, or null where none is known. */
-export function lastChangeOf(address: string, devices: readonly DeviceContext[]): LastChange | null {
+/** The latest change among the devices shown, or null where none is known: of a recording the bench keeps none. */
+export function lastChangeOf(address: string, { devices, recorded }: Bench): LastChange | null {
   let last: LastChange | null = null;
+  if (recorded) return last;
   for (const { slug } of devices) {
     const change = queryClient.getQueryData(lastQuery(slug).queryKey)?.[address];
     if (change && (last === null || change.t_ns > last.change.t_ns)) last = { slug, change };
@@ -55,11 +56,13 @@ const KEPT_MS = 500;
 
 /** Loads the last changes of the devices, and again after every write; grows with what is known. */
 export function useChanges(slugs: readonly string[]): number {
+  const { store, recorded } = useShown();
   const version = useQueries({
-    queries: slugs.map((slug) => lastQuery(slug)),
+    queries: recorded ? [] : slugs.map((slug) => lastQuery(slug)),
     combine: (results) => results.reduce((sum, one) => sum + one.dataUpdatedAt, 0),
   });
   useEffect(() => {
+    if (recorded) return;
     let seen = store.events[0]?.id ?? 0;
     return store.subscribe("events", () => {
       const fresh = store.events.filter((one) => one.id > seen);
@@ -71,6 +74,6 @@ export function useChanges(slugs: readonly string[]): number {
           if (slug !== null) void queryClient.invalidateQueries({ queryKey: keyOf(slug) });
       }, KEPT_MS);
     });
-  }, []);
+  }, [store, recorded]);
   return version;
 }

@@ -1,5 +1,5 @@
 /** The filters beside the text: what differs, what is pending, what a person has starred. */
-import { store } from "../../live/live";
+import type { LiveStore } from "../../live/store";
 import type { GroupTally, ParameterRow } from "../../model/rows";
 import type { StagedState } from "../../model/staged";
 import { keyOf } from "../../model/staged";
@@ -26,7 +26,7 @@ export const writeOnly = (only: ReadonlySet<Only>): string | undefined =>
   only.size === 0 ? undefined : [...only].join();
 
 /** True where two devices are known to hold different values; what is unknown differs from nothing. */
-export function differsBetween(address: string, slugs: readonly string[]): boolean {
+export function differsBetween(address: string, slugs: readonly string[], store: LiveStore): boolean {
   let first: string | number | null = null;
   for (const slug of slugs) {
     const raw = rawOf(store.cell(slug, address));
@@ -49,11 +49,11 @@ export function filterOnly(
   const tests: Record<Only, (row: ParameterRow) => boolean> = {
     [Only.Changed]: ({ entry }) =>
       bench.devices.some(({ slug, node }) =>
-        differsFromDefault(entry, store.cell(slug, entry.address), node),
+        differsFromDefault(entry, bench.store.cell(slug, entry.address), node),
       ),
-    [Only.Different]: ({ entry }) => isCompared(entry) && differsBetween(entry.address, slugs),
+    [Only.Different]: ({ entry }) => isCompared(entry) && differsBetween(entry.address, slugs, bench.store),
     [Only.Unsaved]: ({ entry }) =>
-      bench.devices.some(({ slug }) => isUnsaved(entry, store.cell(slug, entry.address))),
+      bench.devices.some(({ slug }) => isUnsaved(entry, bench.store.cell(slug, entry.address))),
     [Only.Starred]: ({ entry }) => bench.starred.has(entry.address),
     [Only.Pending]: ({ entry }) =>
       bench.devices.some(({ slug }) => staged.changes.has(keyOf(slug, entry.address))),
@@ -72,7 +72,7 @@ export function tallyOf(rows: readonly ParameterRow[], bench: Bench, staged: Sta
     const sum = tally.get(group) ?? { pending: 0, different: 0 };
     tally.set(group, sum);
     if (slugs.some((slug) => staged.changes.has(keyOf(slug, entry.address)))) sum.pending += 1;
-    if (isCompared(entry) && differsBetween(entry.address, slugs)) sum.different += 1;
+    if (isCompared(entry) && differsBetween(entry.address, slugs, bench.store)) sum.different += 1;
   }
   return tally;
 }

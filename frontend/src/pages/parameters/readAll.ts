@@ -4,7 +4,7 @@ import { useEffect, useMemo } from "react";
 import { commands } from "../../api/client";
 import { jobQuery, queryClient } from "../../api/queries";
 import type { Job } from "../../api/types";
-import { store } from "../../live/live";
+import { useShown } from "../../live/live";
 import { type Translate, useTexts } from "../../texts/texts";
 import { notify } from "../../ui/notices";
 import { storyOf } from "../../ui/problem";
@@ -76,13 +76,14 @@ export function useReadAtFirstSight(slug: string, reading: ReadAll): void {
   const slugs = useMemo(() => [slug], [slug]);
   const heard = useCoarseVersion(slugs) > 0;
   const silent = useSilent(slug);
+  const { store, recorded } = useShown();
   const { running, start } = reading;
   useEffect(() => {
-    if (!heard || silent || running || offered.has(slug)) return;
+    if (recorded || !heard || silent || running || offered.has(slug)) return;
     offered.add(slug);
     const known = [...(store.cells(slug)?.values() ?? [])].filter(
       (cell) => cell.known && cell.source === "sdo-read",
     );
     if (known.length === 0) start(null);
-  }, [heard, silent, running, slug, start]);
+  }, [recorded, store, heard, silent, running, slug, start]);
 }

@@ -1,12 +1,18 @@
 /** The pending changes of the page, and the hooks by which components see them. */
 import { useSyncExternalStore } from "react";
 import type { EntryDoc, Raw } from "../../api/types";
-import { store } from "../../live/live";
+import { useShown } from "../../live/live";
 import type { Ground } from "../../model/findings";
 import type { DeviceContext } from "../../model/shown";
-import { type Change, type Keeper, keyOf, StagedStore, type StagedState } from "../../model/staged";
+import {
+  type Change,
+  type Keeper,
+  keyOf,
+  NOTHING_STAGED,
+  StagedStore,
+  type StagedState,
+} from "../../model/staged";
 import type { Lookup } from "../../model/values";
-import { rawOf } from "./cellValue";
 import type { Bench } from "./context";
 
 /** Asked for when it is used, as the code is also read where there is no browser. */
@@ -17,12 +23,15 @@ const keeper: Keeper = {
 
 export const staged = new StagedStore(keeper, () => Date.now());
 
+/** What is pending for the connected turbine; of a recording nothing can be. */
 export function useStaged(): StagedState {
-  return useSyncExternalStore(staged.subscribe, () => staged.state);
+  const { recorded } = useShown();
+  return useSyncExternalStore(staged.subscribe, () => (recorded ? NOTHING_STAGED : staged.state));
 }
 
 export function useChange(device: string, address: string): Change | undefined {
-  return useSyncExternalStore(staged.subscribe, () => staged.get(device, address));
+  const { recorded } = useShown();
+  return useSyncExternalStore(staged.subscribe, () => (recorded ? undefined : staged.get(device, address)));
 }
 
 /** What objects will hold once all that is pending was written. */
@@ -37,11 +46,11 @@ export const plannedContext = (context: DeviceContext): DeviceContext => ({
 
 export function stage(entry: EntryDoc, raw: Raw, devices: readonly DeviceContext[]): void {
   staged.stage(
-    devices.map(({ slug }) => ({
+    devices.map(({ slug, lookup }) => ({
       device: slug,
       address: entry.address,
       raw,
-      from: entry.readable ? rawOf(store.cell(slug, entry.address)) : null,
+      from: entry.readable ? lookup(entry.address) : null,
       atMs: Date.now(),
     })),
   );

@@ -1,12 +1,13 @@
 /** Hooks over several devices at a time. */
 import { useCallback, useMemo, useRef, useSyncExternalStore } from "react";
-import { store, useHearing, useLink, useNodes } from "../../live/live";
+import { useHearing, useLink, useNodes, useStore } from "../../live/live";
 import type { DeviceContext } from "../../model/shown";
 
 const COARSE_MS = 1000;
 
 /** Grows with the values of these devices, at most once a second: for what looks at all rows. */
 export function useCoarseVersion(slugs: readonly string[]): number {
+  const store = useStore();
   const shown = useRef(0);
   const read = () => slugs.reduce((sum, slug) => sum + store.version(slug), 0);
   const subscribe = useCallback(
@@ -25,7 +26,7 @@ export function useCoarseVersion(slugs: readonly string[]): number {
         for (const end of ends) end();
       };
     },
-    [slugs],
+    [store, slugs],
   );
   return useSyncExternalStore(subscribe, () => shown.current || (shown.current = read()));
 }

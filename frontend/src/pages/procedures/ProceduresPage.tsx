@@ -4,7 +4,14 @@ import { Link } from "@tanstack/react-router";
 import { setsQuery } from "../../api/sets";
 import { descriptionQuery, turbineQuery } from "../../api/queries";
 import { roomSearch, usePageSearch } from "../../frame/search";
-import { store, useHearing, useLink, useNodes, useServerNow, useWatchDevice } from "../../live/live";
+import {
+  liveStore as store,
+  useHearing,
+  useLink,
+  useNodes,
+  useServerNow,
+  useWatchDevice,
+} from "../../live/live";
 import { useTexts } from "../../texts/texts";
 import { placesOf } from "../../ui/devices";
 import room from "../../ui/Room.module.css";

@@ -5,17 +5,20 @@ import { attachmentDownload, recordingQuery } from "../../api/files";
 import type { RecordingDoc, RecordingRef } from "../../api/types";
 import { usePageSearch } from "../../frame/search";
 import { figure } from "../../model/values";
+import { useOpenReplay } from "../../replay/leaving";
 import { useTexts } from "../../texts/texts";
 import { ProblemAlert } from "../../ui/ProblemAlert";
 import room from "../../ui/Room.module.css";
 import { bytes, dayAndTime } from "../../ui/format";
-import { Download, RecordingState } from "./RecordingsPage";
+import { Download, RecordingState, ReplayButton } from "./RecordingsPage";
+import { RecordingFiles } from "./RecordingFiles";
 import { RecoverSets } from "./RecoverSets";
 
 /** What one recording holds, where it lies, and what is missing in it. */
 export function RecordingDetails({ file }: { file: RecordingRef }) {
   const t = useTexts();
   const [, update] = usePageSearch();
+  const replay = useOpenReplay();
   const doc = useQuery(recordingQuery(file.name));
   return (
     <section className={room.details} aria-label={file.name} data-testid="recording-details">
@@ -23,6 +26,7 @@ export function RecordingDetails({ file }: { file: RecordingRef }) {
         <h2>{file.name}</h2>
         <RecordingState state={file.state} />
         <span className={room.spacer} />
+        <ReplayButton file={file} onReplay={replay} />
         <Download file={file} />
         <CloseButton aria-label={t("page.close")} onClick={() => update({ file: undefined })} />
       </div>
@@ -30,7 +34,7 @@ export function RecordingDetails({ file }: { file: RecordingRef }) {
       <div className={room.detailsBody}>
         {doc.isError && <ProblemAlert error={doc.error} title={t("page.recordings.unreadable")} />}
         {doc.isPending && <span className="dim">{t("page.loading")}</span>}
-        {doc.data && <Content doc={doc.data} />}
+        {doc.data && <Content doc={doc.data} file={file} />}
       </div>
     </section>
   );
@@ -48,7 +52,7 @@ function StateNote({ file }: { file: RecordingRef }) {
   );
 }
 
-function Content({ doc }: { doc: RecordingDoc }) {
+function Content({ doc, file }: { doc: RecordingDoc; file: RecordingRef }) {
   const t = useTexts();
   const tables = Object.entries(doc.metadata).filter(([name]) => name !== "chunk_channels");
   return (
@@ -67,6 +71,7 @@ function Content({ doc }: { doc: RecordingDoc }) {
       )}
       <Missing doc={doc} />
       <RecoverSets name={doc.name} />
+      <RecordingFiles file={file} />
       {doc.attachments.length > 0 && (
         <div>
           <h3>{t("page.recordings.attachments")}</h3>

@@ -6,30 +6,85 @@ import {
   IconDownload,
   IconFileAlert,
   IconHourglass,
+  IconPlayerPlay,
 } from "@tabler/icons-react";
 import { useQuery } from "@tanstack/react-query";
-import { useMemo } from "react";
+import { lazy, Suspense, useMemo } from "react";
 import { recordingDownload, recordingsQuery } from "../../api/files";
 import type { LinkData, RecordingRef } from "../../api/types";
 import { usePageSearch } from "../../frame/search";
-import { useLink, useServerNow } from "../../live/live";
+import { useLiveLink, useServerNow } from "../../live/live";
 import { figure } from "../../model/values";
+import { useOpenReplay } from "../../replay/leaving";
 import { type Translate, useTexts } from "../../texts/texts";
 import { DataTable, type TableColumn } from "../../ui/DataTable";
 import { ProblemAlert } from "../../ui/ProblemAlert";
 import room from "../../ui/Room.module.css";
 import { bytes, clock, dayAndTime } from "../../ui/format";
+import { TabbedRoom } from "../../ui/TabbedRoom";
+import { ImportRecording } from "./RecordingFilesImport";
 import { RecordingDetails } from "./RecordingDetails";
 
 const SECOND_MS = 1000;
 
-/** The recordings on the disk, the running one first of all; one of them opened below. */
+const Desk = lazy(async () => ({ default: (await import("./desk/Desk")).Desk }));
+
+/** Each comes when it is looked at. */
+const TABS = {
+  files: RecordingList,
+  incidents: lazy(async () => ({ default: (await import("./incidents/IncidentsTab")).IncidentsTab })),
+  search: lazy(async () => ({ default: (await import("./search/SearchTab")).SearchTab })),
+  overlay: lazy(async () => ({ default: (await import("./overlay/OverlayTab")).OverlayTab })),
+};
+
+/** What belongs to one tab. */
+const OWN = [
+  "find",
+  "order",
+  "less",
+  "file",
+  "q",
+  "select",
+  "incident",
+  "overlay",
+  "curves",
+  "window",
+] as const;
+
+/** The recordings and what is kept and looked for in them; while one is replayed, its desk. */
 export function RecordingsPage() {
+  const [search] = usePageSearch();
+  if (search.replay === undefined) return <Rooms />;
+  return (
+    <Suspense>
+      <Desk />
+    </Suspense>
+  );
+}
+
+function Rooms() {
+  const t = useTexts();
+  const [search] = usePageSearch();
+  return (
+    <TabbedRoom
+      name="recordings"
+      label={t("page.recordings.tab.label")}
+      titleOf={(tab) => t(`page.recordings.tab.${tab}`)}
+      tabs={TABS}
+      usual={search.incident === undefined ? undefined : "incidents"}
+      own={OWN}
+    />
+  );
+}
+
+/** The recordings on the disk, the running one first of all; one of them opened below. */
+function RecordingList() {
   const t = useTexts();
   const list = useQuery(recordingsQuery);
-  const link = useLink();
+  const link = useLiveLink();
+  const replay = useOpenReplay();
   const [search, update] = usePageSearch();
-  const columns = useMemo(() => columnsOf(t, link), [t, link]);
+  const columns = useMemo(() => columnsOf(t, link, replay), [t, link, replay]);
   const files = useMemo(() => latestFirst(list.data?.files ?? [], link), [list.data, link]);
   const opened = files.find((file) => file.name === search.file);
   return (
@@ -38,6 +93,7 @@ export function RecordingsPage() {
         <h1>{t("page.rooms.recordings")}</h1>
         <Running link={link} />
         <span className={room.spacer} />
+        <ImportRecording />
         {list.data && (
           <div className={room.facts} data-testid="recordings-folder">
             <span className={`${room.path} dim`}>{list.data.folder}</span>
@@ -56,6 +112,7 @@ export function RecordingsPage() {
         fileName="hubside-recordings"
         empty={t(list.isPending ? "page.loading" : "page.recordings.none")}
         onOpen={(file) => update({ file: file.name })}
+        onRun={(file) => notReplayed(file, t) === null && replay(file.name)}
         selected={search.file}
         hiddenFirst={HIDDEN_FIRST}
       />
@@ -99,6 +156,55 @@ const STATE_LOOKS = {
   unread: { Icon: IconHourglass, tone: "dim" },
 };
 
+/** Why a file cannot be replayed, and what helps; null where it can. */
+export function notReplayed({ state }: RecordingRef, t: Translate): string | null {
+  return state === "live" || state === "unreadable" ? t(`page.recordings.not_replayed.${state}`) : null;
+}
+
+interface ReplayButtonProps {
+  file: RecordingRef;
+  onReplay: (file: string) => void;
+  small?: boolean;
+}
+
+export function ReplayButton({ file, onReplay, small = false }: ReplayButtonProps) {
+  const t = useTexts();
+  const reason = notReplayed(file, t);
+  const label = t("page.recordings.replay_of", { name: file.name });
+  const title = reason === null ? label : t("page.recordings.not_replayable", { reason });
+  const open = (event: React.MouseEvent) => {
+    event.stopPropagation();
+    onReplay(file.name);
+  };
+  const testId = `replay-${file.name}`;
+  if (small)
+    return (
+      <ActionIcon
+        variant="subtle"
+        color="violet"
+        disabled={reason !== null}
+        aria-label={title}
+        title={title}
+        onClick={open}
+        data-testid={testId}
+      >
+        <IconPlayerPlay size={18} aria-hidden />
+      </ActionIcon>
+    );
+  return (
+    <Button
+      color="violet"
+      disabled={reason !== null}
+      title={title}
+      leftSection={<IconPlayerPlay size={17} aria-hidden />}
+      onClick={open}
+      data-testid="replay"
+    >
+      {t("page.recordings.replay")}
+    </Button>
+  );
+}
+
 export function RecordingState({ state }: Pick<RecordingRef, "state">) {
   const t = useTexts();
   const { Icon, tone } = STATE_LOOKS[state];
@@ -126,7 +232,7 @@ function factsOf(file: RecordingRef, link: LinkData | null) {
   };
 }
 
-const HIDDEN_FIRST = ["events", "file"];
+const HIDDEN_FIRST = ["events"];
 
 /** The running one first, then by when they were begun: a copied file is not a new one. */
 function latestFirst(files: readonly RecordingRef[], link: LinkData | null): RecordingRef[] {
@@ -137,7 +243,11 @@ function latestFirst(files: readonly RecordingRef[], link: LinkData | null): Rec
 
 const orDash = (text: string | null | undefined) => (text == null || text === "" ? "–" : text);
 
-function columnsOf(t: Translate, link: LinkData | null): TableColumn<RecordingRef>[] {
+function columnsOf(
+  t: Translate,
+  link: LinkData | null,
+  replay: (file: string) => void,
+): TableColumn<RecordingRef>[] {
   const facts = (file: RecordingRef) => factsOf(file, link);
   const count = (number: number | null) => (number === null ? "–" : figure(number, 0, t.language));
   const title = (id: string) => t(`page.recordings.column.${id}`);
@@ -146,10 +256,19 @@ function columnsOf(t: Translate, link: LinkData | null): TableColumn<RecordingRe
     {
       id: "state",
       title: title("state"),
-      width: "minmax(118px, 0.9fr)",
+      width: "minmax(158px, 0.9fr)",
       fixed: true,
-      text: (file) => t(`page.recordings.state.${file.state}`),
-      cell: (file) => <RecordingState state={file.state} />,
+      text: (file) =>
+        [
+          t(`page.recordings.state.${file.state}`),
+          ...(file.sample ? [t("page.recordings.sample")] : []),
+        ].join(" "),
+      cell: (file) => (
+        <span className={room.state}>
+          <RecordingState state={file.state} />
+          {file.sample && <span className={room.sample}>{t("page.recordings.sample")}</span>}
+        </span>
+      ),
     },
     {
       id: "started",
@@ -223,6 +342,14 @@ function columnsOf(t: Translate, link: LinkData | null): TableColumn<RecordingRe
       title: title("file"),
       width: "minmax(120px, 1.6fr)",
       text: (file) => file.name,
+    },
+    {
+      id: "replay",
+      title: "",
+      width: "44px",
+      fixed: true,
+      text: () => "",
+      cell: (file) => <ReplayButton file={file} onReplay={replay} small />,
     },
     {
       id: "download",

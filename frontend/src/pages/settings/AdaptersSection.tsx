@@ -214,7 +214,7 @@ function Check({ adapter }: { adapter: Adapter }) {
     <div className={classes.turbine}>
       <div className={classes.row} style={{ alignItems: "flex-start" }}>
         <BitrateSelect adapter={adapter} value={bitrate} onChange={setBitrate} />
-        <NeedsRole role="technician">
+        <NeedsRole role="technician" device>
           {(locked) => (
             <Button
               mt={25}
@@ -227,7 +227,7 @@ function Check({ adapter }: { adapter: Adapter }) {
             </Button>
           )}
         </NeedsRole>
-        <NeedsRole role="technician">
+        <NeedsRole role="technician" device>
           {(locked) => (
             <Button
               mt={25}

@@ -1,14 +1,15 @@
-import { ActionIcon, Autocomplete, Button, Select, TextInput, Tooltip } from "@mantine/core";
+import { ActionIcon, Autocomplete, Button, NumberInput, Select, TextInput, Tooltip } from "@mantine/core";
 import { IconPlus, IconRadar2, IconTrash } from "@tabler/icons-react";
 import { useQuery } from "@tanstack/react-query";
 import { useState } from "react";
 import { adaptersQuery, type Site, type SiteBus, type SiteTurbine } from "../../api/settings";
 import { useTexts } from "../../texts/texts";
+import { typedNumber } from "../../ui/typedNumber";
 import { kbit } from "./AdaptersSection";
 import { useFlaw } from "./flaws";
 import { ScanPanel } from "./ScanPanel";
 import classes from "./Settings.module.css";
-import { DEFAULT_BITRATE } from "./siteDraft";
+import { NEW_BUS } from "./siteDraft";
 
 const RATES = [10_000, 20_000, 50_000, 125_000, 250_000, 500_000, 800_000, 1_000_000];
 
@@ -66,7 +67,7 @@ export function BusEditor({ site, draft, before, onChange }: Props) {
 function newBus(draft: SiteTurbine): SiteBus {
   const taken = draft.buses.map((bus) => bus.name);
   const name = ["can0", "can1", "can2", "can3"].find((one) => !taken.includes(one)) ?? "";
-  return { name, connection: "", bitrate: DEFAULT_BITRATE };
+  return { name, ...NEW_BUS };
 }
 
 /** Devices follow a bus that gets another name. */
@@ -94,6 +95,7 @@ function BusRow({ bus, fixed, scanning, onChange, onRemove, onScan }: RowProps) 
   const nameFlaw = useFlaw(`${at}.name`);
   const connectionFlaw = useFlaw(`${at}.connection`);
   const bitrateFlaw = useFlaw(`${at}.bitrate`);
+  const heartbeatFlaw = useFlaw(`${at}.heartbeat_node`);
   const adapters = useQuery(adaptersQuery).data?.adapters ?? [];
   const inText = bus.connection.includes("@");
   return (
@@ -132,6 +134,20 @@ function BusRow({ bus, fixed, scanning, onChange, onRemove, onScan }: RowProps) 
         allowDeselect={false}
         onChange={(text) => onChange({ ...bus, bitrate: Number(text) })}
       />
+      <Tooltip label={t("page.settings.turbines.heartbeat_explain")} multiline w={280}>
+        <NumberInput
+          w={104}
+          label={t("page.settings.turbines.heartbeat_node")}
+          value={bus.heartbeat_node}
+          error={heartbeatFlaw}
+          min={1}
+          max={127}
+          allowDecimal={false}
+          clampBehavior="strict"
+          onChange={(value) => typedNumber(value, (node) => onChange({ ...bus, heartbeat_node: node }))}
+          data-testid="heartbeat-node"
+        />
+      </Tooltip>
       <Button
         mt={25}
         variant={scanning ? "filled" : "default"}

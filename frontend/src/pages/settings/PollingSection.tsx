@@ -49,7 +49,7 @@ function PollEditor({ before }: { before: Polling }) {
         <ProblemAlert error={saving.error} title={t("page.settings.polling.not_saved")} />
       )}
       <div className={classes.foot}>
-        <NeedsRole role="technician">
+        <NeedsRole role="technician" device>
           {(locked) => (
             <Button
               leftSection={<IconDeviceFloppy size={18} aria-hidden />}

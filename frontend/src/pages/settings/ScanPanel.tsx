@@ -27,7 +27,7 @@ export function ScanPanel({ bus, draft, descriptions, onTaken }: Props) {
     <div className={classes.turbine} style={{ padding: "12px 0 4px" }} data-testid="scan-panel">
       <p className={classes.places}>{t("page.settings.scan.explain")}</p>
       <div className={classes.row}>
-        <NeedsRole role="technician">
+        <NeedsRole role="technician" device>
           {(locked) => (
             <Button
               leftSection={<IconRadar2 size={18} aria-hidden />}

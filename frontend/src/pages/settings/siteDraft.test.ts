@@ -5,7 +5,7 @@ import { emptyTurbine, fieldOf, flawsOf, isKnown, takeOver } from "./siteDraft";
 const turbine = (): SiteTurbine => ({
   slug: "wtg-08",
   name: "WTG-08",
-  buses: [{ name: "can0", connection: "socketcan:can0", bitrate: 500_000 }],
+  buses: [{ name: "can0", connection: "socketcan:can0", bitrate: 500_000, heartbeat_node: 126 }],
   stations: [
     {
       slug: "blade-1",

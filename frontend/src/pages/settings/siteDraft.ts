@@ -11,13 +11,14 @@ export interface Flaw {
 const SLUG = /^[a-z0-9]+(-[a-z0-9]+)*$/;
 const NODES = { first: 1, last: 127 };
 export const DEFAULT_BITRATE = 500_000;
+export const NEW_BUS = { connection: "", bitrate: DEFAULT_BITRATE, heartbeat_node: 126 };
 
 export const stationAt = (station: SiteStation) => `station.${station.slug}`;
 export const deviceAt = (station: SiteStation, device: SiteDevice) =>
   `${stationAt(station)}.device.${device.slug}`;
 
 export function emptyTurbine(): SiteTurbine {
-  const bus = { name: "can0", connection: "", bitrate: DEFAULT_BITRATE };
+  const bus = { name: "can0", ...NEW_BUS };
   return { slug: "", name: "", buses: [bus], stations: [] };
 }
 

@@ -39,7 +39,7 @@ export function Unread({ compared }: { compared: Compared }) {
         ))}
       </ul>
       <span className={classes.spacer} />
-      <NeedsRole role="technician">
+      <NeedsRole role="technician" device>
         {(locked) => (
           <Button
             px="sm"

@@ -14,6 +14,7 @@ export enum Source {
   Year = "year",
   Latest = "latest",
   Set = "set",
+  Moment = "moment",
 }
 
 export interface Spec {
@@ -49,8 +50,13 @@ export const columnsText = (columns: readonly string[]): string | undefined =>
 /** The device that a column is of; null for a set of the library, which says itself whose it is. */
 export function deviceOf(column: string): string | null {
   const spec = parseSpec(column);
-  return spec === null || spec.source === Source.Set ? null : spec.of;
+  if (spec === null || spec.source === Source.Set) return null;
+  return spec.source === Source.Moment ? spec.of.slice(spec.of.indexOf("/") + 1) : spec.of;
 }
+
+/** What a recording had shown of a device until a time. */
+export const momentOf = (recording: string, tNs: number, slug: string): string =>
+  specText({ source: Source.Moment, of: `${recording}@${BigInt(tNs)}/${slug}` });
 
 /** True where the column changes while it is looked at. */
 export function isLive(column: string): boolean {

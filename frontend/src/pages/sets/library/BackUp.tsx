@@ -63,7 +63,7 @@ export function BackUp() {
         if (able) start.mutate(reason.trim());
       }}
     >
-      <NeedsRole role="technician">
+      <NeedsRole role="technician" device>
         {(locked) => (
           <Button
             type="submit"

@@ -1,14 +1,4 @@
-import {
-  Autocomplete,
-  Button,
-  Checkbox,
-  FileInput,
-  Group,
-  Modal,
-  Select,
-  Stack,
-  TextInput,
-} from "@mantine/core";
+import { Autocomplete, Button, Checkbox, FileInput, Group, Select, Stack, TextInput } from "@mantine/core";
 import { IconFileImport } from "@tabler/icons-react";
 import { useMutation, useQuery } from "@tanstack/react-query";
 import { useState } from "react";
@@ -20,6 +10,7 @@ import { useTexts } from "../../../texts/texts";
 import { ProblemAlert } from "../../../ui/ProblemAlert";
 import room from "../../../ui/Room.module.css";
 import { placesOf } from "../../../ui/devices";
+import { Dialog } from "../../../ui/Dialog";
 
 const KINDS = ["oat-pmm", "oat-pmc", "nanotec-pd4e", "wandfluh-ed2"];
 const PIECE = 0x8000;
@@ -43,12 +34,12 @@ export function ImportSet() {
           </Button>
         )}
       </NeedsRole>
-      {open && <Dialog onClose={() => setOpen(false)} />}
+      {open && <ImportDialog onClose={() => setOpen(false)} />}
     </>
   );
 }
 
-function Dialog({ onClose }: { onClose: () => void }) {
+function ImportDialog({ onClose }: { onClose: () => void }) {
   const t = useTexts();
   const [, update] = usePageSearch();
   const taking = useMutation({
@@ -56,7 +47,7 @@ function Dialog({ onClose }: { onClose: () => void }) {
     onSuccess: () => queryClient.invalidateQueries({ queryKey: setsQuery.queryKey }),
   });
   return (
-    <Modal opened onClose={onClose} title={t("page.sets.import.title")} size="lg">
+    <Dialog opened onClose={onClose} title={t("page.sets.import.title")} size="lg">
       {taking.data ? (
         <Taken
           taken={taking.data}
@@ -68,7 +59,7 @@ function Dialog({ onClose }: { onClose: () => void }) {
       ) : (
         <Form error={taking.error} busy={taking.isPending} onTake={(file) => taking.mutate(file)} />
       )}
-    </Modal>
+    </Dialog>
   );
 }
 

@@ -177,7 +177,7 @@ function DeviceActions({ sides, form }: { sides: readonly Side[]; form: MotorFor
   const failed = read.error ?? assign.error;
   return (
     <div style={{ display: "flex", flexWrap: "wrap", gap: 10, paddingTop: 12 }}>
-      <NeedsRole role="technician">
+      <NeedsRole role="technician" device>
         {(locked) => (
           <Button
             variant="default"

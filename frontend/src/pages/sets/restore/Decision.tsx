@@ -18,7 +18,7 @@ export function Decision({ doc, onward, label, disabled = false }: Props) {
   const t = useTexts();
   const way = useWay(doc);
   return (
-    <NeedsRole role="technician">
+    <NeedsRole role="technician" device>
       {(locked) => (
         <div className={classes.buttons}>
           <HoldButton

@@ -1,4 +1,4 @@
-import { Button, Modal, Stack, Text, Textarea } from "@mantine/core";
+import { Button, Stack, Text, Textarea } from "@mantine/core";
 import { useMutation } from "@tanstack/react-query";
 import { useState } from "react";
 import { queryClient } from "../../../api/queries";
@@ -7,6 +7,7 @@ import { NeedsRole } from "../../../frame/NeedsRole";
 import { useTexts } from "../../../texts/texts";
 import { HoldButton } from "../../../ui/HoldButton";
 import { ProblemAlert } from "../../../ui/ProblemAlert";
+import { Dialog } from "../../../ui/Dialog";
 
 interface Props {
   doc: Pick<RestoreDoc, "id">;
@@ -51,11 +52,10 @@ function GiveUpDialog({ doc, station, onClose }: Props & { onClose: () => void }
     },
   });
   return (
-    <Modal
+    <Dialog
       opened
       onClose={onClose}
       title={<Text fw={700}>{t("page.restoring.give_up.title", { station })}</Text>}
-      closeButtonProps={{ "aria-label": t("page.close") }}
       size="lg"
     >
       <Stack gap="md" align="flex-start">
@@ -83,6 +83,6 @@ function GiveUpDialog({ doc, station, onClose }: Props & { onClose: () => void }
           {t("page.restoring.give_up.button")}
         </HoldButton>
       </Stack>
-    </Modal>
+    </Dialog>
   );
 }

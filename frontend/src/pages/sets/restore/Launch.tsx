@@ -83,7 +83,7 @@ export function Launch({ planned, order, station, terms, onTerms, confirmMin, on
         onChange={(event) => onTerms({ ...terms, restart: event.currentTarget.checked })}
         data-testid="restore-restart"
       />
-      <NeedsRole role="technician">
+      <NeedsRole role="technician" device>
         {(locked) => (
           <HoldButton
             tone="accent"

@@ -84,7 +84,7 @@ function Running({ doc }: { doc: RestoreDoc }) {
         {doc.state === "rolling-back" && <Cause doc={doc} />}
       </div>
       {!waits && doc.can.includes("roll-back") && (
-        <NeedsRole role="technician">
+        <NeedsRole role="technician" device>
           {(locked) => (
             <Button
               color="orange"

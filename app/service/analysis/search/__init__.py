@@ -1,0 +1,1 @@
+"""Searching recordings for a signature: events in their order, and conditions of signals."""

@@ -1,0 +1,102 @@
+"""What becomes of the frames of one bus, whether they come from a wire or from a recording: load, trace, live state."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from threading import Lock
+from typing import Final
+
+from app.model.description import Description
+from app.recording.content import EventKind
+from app.recording.index.course import GAP_REASONS
+from app.service.trace.log import BusTrace
+from app.wire.busload import EXTENDED_KEY, BusLoad, LoadSecond
+from app.wire.can_bits import frame_bits
+from app.wire.decoder import CanOpenDecoder
+from app.wire.frame import Can, Frame
+from app.wire.live import LiveState
+from app.wire.pdo_follower import PdoRoute
+from app.wire.records import Record
+
+GAP_REASON: Final = GAP_REASONS[EventKind.BUS_LOST]
+
+
+class BusFeed:
+    """Frames of a CANopen bus go through the decoder into the live state and count as bus load.
+
+    ``lock`` is shared by all buses of a stage, because the live state has one writer at a time. ``descriptions`` by
+    node; ``bitrate`` in bit/s.
+    """
+
+    def __init__(
+        self, name: str, bitrate: int, descriptions: Mapping[int, Description], live: LiveState, lock: Lock
+    ) -> None:
+        self.name = name
+        self.bitrate = bitrate
+        self.decoder = CanOpenDecoder(name, descriptions)
+        self.load = BusLoad(bitrate)
+        self.trace = BusTrace(name, self.decoder, lock)
+        self.frames = 0
+        self._live = live
+        self._lock = lock
+
+    def describe(self, node: int, description: Description) -> None:
+        """Tell decoder and live state what stands at ``node``."""
+        with self._lock:
+            self.decoder.set_description(node, description)
+            self.trace.describe(node, description)
+            self._live.set_description(self.name, node, description)
+
+    def take(self, frames: Sequence[Frame]) -> None:
+        """Count and decode frames of this bus."""
+        with self._lock:
+            self.frames += len(frames)
+            count = self.load.feed
+            for t_ns, _, _, can, _ in frames:
+                if type(can) is Can:
+                    count(t_ns, frame_bits(can), can.can_id, can.extended)
+            self.trace.take(frames)
+            records = self.decoder.feed_all(frames)
+            if records:
+                self.trace.heard(records)
+                self._heard(records)
+                self._live.apply_all(records)
+
+    def gap(self, t_ns: int, reason: str = GAP_REASON) -> None:
+        """Frames are missing before ``t_ns``: what was read until then proves nothing any more."""
+        with self._lock:
+            self.trace.gap(t_ns, reason)
+            records = self.decoder.gap(t_ns, reason)
+            self.trace.heard(records)
+            self._live.apply_all(records)
+
+    def _heard(self, records: Sequence[Record]) -> None:
+        """What the frames told, before the live state takes it."""
+
+    def bus_load(self, now_ns: int) -> float:
+        """Load of the last second, 0..1."""
+        with self._lock:
+            return self.load.load(now_ns)
+
+    def node_load(self, now_ns: int) -> dict[int, float]:
+        """Load of the last second by node; 0 is what belongs to none."""
+        with self._lock:
+            return self.load.shares_by(self._node_of, now_ns)
+
+    def identifier_load(self, now_ns: int) -> dict[int, float]:
+        """Load of the last second by identifier; 29-bit identifiers have 2^29 added."""
+        with self._lock:
+            return self.load.shares(now_ns)
+
+    def load_history(self, seconds: int) -> tuple[list[LoadSecond], list[tuple[int, dict[int, float]]]]:
+        """The last full seconds, oldest first: the load, and the load by node."""
+        with self._lock:
+            return list(self.load.history)[-seconds:], self.load.history_by(self._node_of)[-seconds:]
+
+    def _node_of(self, key: int) -> int:
+        return self.decoder.speaker(key & ~EXTENDED_KEY, bool(key & EXTENDED_KEY)).node
+
+    def pdos(self, node: int) -> tuple[PdoRoute, ...]:
+        """The PDOs of ``node`` by the mapping in force."""
+        with self._lock:
+            return self.decoder.pdos(node)

@@ -1,0 +1,252 @@
+"""The controlword of one axis in the hands of who moves it (CiA 402; OAT manual 5.8, tables 49 to 53).
+
+Words go by RPDO1, past all queues. Before each one is asked whether anybody else has commanded the axis since, STOP and
+FEATHER first of all: then nothing is sent any more (OvertakenError).
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Collection
+from enum import IntEnum
+from typing import Any, Final
+
+from app.errors import AxisStateError, OvertakenError, UnverifiedError
+from app.model.address import Address
+from app.model.axis_state import ENERGISED, AxisState
+from app.model.description import Verify
+from app.model.values import to_scaled
+from app.service.devices import Target, decode
+from app.service.stop import CONTROLWORD, STATUSWORD
+
+MODE: Final = Address(0x6060)
+MODE_SHOWN: Final = Address(0x6061)
+VELOCITY: Final = Address(0x606C)
+MANUAL: Final = Address(0x5040)
+_LOOK_S: Final = 0.01
+STATE_TIMEOUT_S: Final = 3.0
+STAND_TIMEOUT_S: Final = 10.0
+RESET_TIMEOUT_S: Final = 1.0
+_STANDS_DPS: Final = 0.1
+
+
+class Word(IntEnum):
+    """Controlwords (table 52)."""
+
+    SHUTDOWN = 0x0106
+    SWITCH_ON = 0x0107
+    HALT = 0x010F
+    RUN = 0x000F
+    NEW_SET_POINT = 0x001F
+    QUICK_STOP = 0x010B
+    DISABLE_VOLTAGE = 0x010C
+    HOME = 0x0116
+    FAULT_RESET = 0x0186
+    FEATHER = 0x080F
+
+
+_OFF: Final = frozenset({AxisState.SWITCH_ON_DISABLED, AxisState.READY})
+TARGET_REACHED: Final = 1 << 10
+ACKNOWLEDGED: Final = 1 << 12
+REMOTE: Final = 1 << 9
+"""The axis listens to its controlword; 0 while its EFC input controls it."""
+
+
+class AxisMode(IntEnum):
+    """Modes of operation (6060h) that this tool uses."""
+
+    PROFILE_POSITION = 1
+    PROFILE_VELOCITY = 3
+    HOMING = 6
+
+
+class Control:
+    """Commands to one axis. ``send`` puts the controlword into RPDO1; False: no such PDO is in force.
+
+    ``own`` begins a command; what else commands the axis after it ends the command.
+    """
+
+    def __init__(self, driver: Any, target: Target, send: Callable[[bytes], bool]) -> None:
+        self.driver = driver
+        self.target = target
+        self._send = send
+        self._known = 0
+        self._sent = self._ended = False
+
+    def own(self) -> None:
+        """Command the axis from now on: another order begins."""
+        self._known = self._count()
+        self._sent = self._ended = False
+
+    def _count(self) -> int:
+        return int(self.driver.commanded(self.target.node, CONTROLWORD))
+
+    @property
+    def overtaken(self) -> bool:
+        """Somebody else has commanded the axis since, STOP and FEATHER first of all."""
+        return self._count() != self._known
+
+    def require_own(self) -> None:
+        """Raises OvertakenError where somebody else has commanded the axis since, or ``stop`` has ended it."""
+        if self.overtaken or self._ended:
+            raise OvertakenError(address=CONTROLWORD.short, node=self.target.node)
+
+    def word(self, word: Word) -> None:
+        """Send a controlword. Raises OvertakenError, AxisStateError (not operational), BusLostError."""
+        self.require_own()
+        self._sent = True
+        sent = self._send(word.to_bytes(2, "little"))
+        self._known = self._count()
+        if not sent:
+            raise AxisStateError(device=self.target.slug, state="not operational", wanted="operational")
+
+    def stop(self) -> bool:
+        """Quick stop at once. False where it could not be sent as a PDO and has to be written.
+
+        What this order had the axis do ends by it. Where it has sent nothing yet, or somebody else has commanded the
+        axis since, nothing is sent: it would end a FEATHER. Raises BusLostError.
+        """
+        self._ended = True
+        if self.overtaken or not self._sent:
+            return True
+        sent = self._send(Word.QUICK_STOP.to_bytes(2, "little"))
+        self._known = self._count()
+        return sent
+
+    async def stop_by_sdo(self) -> None:
+        """Quick stop where no PDO carries it: ahead of all that waits. Raises NoAnswerError, DeviceError."""
+        if self.overtaken or not self._sent:
+            return
+        data = Word.QUICK_STOP.to_bytes(2, "little")
+        self._known += 1  # an urgent write counts itself
+        await self.driver.write(self.target.node, CONTROLWORD, data, verify=Verify.ACK, urgent=True)
+
+    # -- what the axis says --------------------------------------------------------
+
+    async def number(self, address: Address) -> int:
+        """An object of the axis. Raises NoAnswerError, DeviceError, AxisStateError (no number came)."""
+        data = await self.driver.read(self.target.node, address)
+        raw = decode(self.target.entry(address), data)
+        if not isinstance(raw, int):
+            raise AxisStateError(device=self.target.slug, state=data.hex(" "), wanted=address.short)
+        return raw
+
+    async def status(self) -> int:
+        """The statusword."""
+        return await self.number(STATUSWORD)
+
+    async def state(self) -> AxisState:
+        """The state. Raises AxisStateError where the statusword tells none."""
+        status = await self.status()
+        found = AxisState.of(status)
+        if found is None:
+            raise AxisStateError(device=self.target.slug, state=f"{status:04X}h", wanted="CiA 402")
+        return found
+
+    async def until(self, wanted: Collection[AxisState], timeout_s: float = STATE_TIMEOUT_S) -> AxisState:
+        """Wait for one of these states. Raises AxisStateError when another one stays, or a fault comes."""
+        end_s = asyncio.get_running_loop().time() + timeout_s
+        while (state := await self.state()) not in wanted:
+            late = asyncio.get_running_loop().time() >= end_s
+            if late or (state is AxisState.FAULT and AxisState.FAULT not in wanted):
+                names = " / ".join(sorted(one.name.lower() for one in wanted))
+                raise AxisStateError(device=self.target.slug, state=state.name.lower(), wanted=names)
+            await asyncio.sleep(_LOOK_S)
+        return state
+
+    async def until_bits(self, bits: int, are_set: bool, timeout_s: float = STATE_TIMEOUT_S) -> int:
+        """Wait until all ``bits`` of the statusword are set, or none of them. Raises AxisStateError."""
+        end_s = asyncio.get_running_loop().time() + timeout_s
+        while (status := await self.status()) & bits != (bits if are_set else 0):
+            if asyncio.get_running_loop().time() >= end_s:
+                wanted = f"bits {bits:04X}h {'set' if are_set else 'clear'}"
+                raise AxisStateError(device=self.target.slug, state=f"{status:04X}h", wanted=wanted)
+            await asyncio.sleep(_LOOK_S)
+        return status
+
+    async def until_still(self, timeout_s: float = STAND_TIMEOUT_S) -> bool:
+        """Wait until the axis stands; whether it does."""
+        end_s = asyncio.get_running_loop().time() + timeout_s
+        entry = self.target.entry(VELOCITY)
+        while True:
+            speed = to_scaled(entry, await self.number(VELOCITY), self.target.lookup)
+            if speed is not None and abs(speed.number) <= _STANDS_DPS:
+                return True
+            if asyncio.get_running_loop().time() >= end_s:
+                return False
+            await asyncio.sleep(_LOOK_S)
+
+    # -- sequences -------------------------------------------------------------------
+
+    async def until_off(self, timeout_s: float) -> bool:
+        """Wait until the axis has no power; whether it has none. Raises what reading raises."""
+        end_s = asyncio.get_running_loop().time() + timeout_s
+        while await self.state() in ENERGISED:
+            if asyncio.get_running_loop().time() >= end_s:
+                return False
+            await asyncio.sleep(_LOOK_S)
+        return True
+
+    async def switch_off(self) -> None:
+        """Output stage off, brake engaged: ready, or switch-on disabled. Raises AxisStateError, OvertakenError."""
+        state = await self.state()
+        if state in (AxisState.OPERATION_ENABLED, AxisState.SWITCHED_ON):
+            self.word(Word.SHUTDOWN)
+        if state is not AxisState.FAULT:
+            await self.until({*_OFF, AxisState.FAULT})
+
+    async def set_mode(self, mode: AxisMode) -> None:
+        """Change the mode; the output stage is switched off for it (manual 5.9). Raises UnverifiedError too."""
+        if await self.number(MODE_SHOWN) == mode:
+            return
+        await self.switch_off()
+        self.word(Word.SHUTDOWN)  # bit 3 of the word that stands must be 0 too
+        self.require_own()
+        await self.driver.write(self.target.node, MODE, mode.to_bytes(1, "little"), verify=Verify.ACK)
+        found = await self.number(MODE_SHOWN)
+        if found != mode:
+            raise UnverifiedError(
+                address=MODE.short, name="mode", sent=str(int(mode)), found=str(found), reason="the mode did not change"
+            )
+
+    async def enable(self) -> None:
+        """Operation enabled, halted: the axis holds where it is. Raises AxisStateError, OvertakenError."""
+        state = await self.state()
+        if state in (AxisState.FAULT, AxisState.FAULT_REACTION_ACTIVE):
+            raise AxisStateError(device=self.target.slug, state=state.name.lower(), wanted="operation_enabled")
+        if state is AxisState.OPERATION_ENABLED:
+            self.word(Word.HALT)
+            return
+        self.word(Word.SHUTDOWN)
+        await self.until({AxisState.READY})
+        self.word(Word.SWITCH_ON)
+        await self.until({AxisState.SWITCHED_ON})
+        self.word(Word.HALT)
+        await self.until({AxisState.OPERATION_ENABLED})
+
+    async def reset_fault(self) -> AxisState:
+        """Reset the fault; the state that came of it, which is the fault where its cause still stands.
+
+        By an edge of bit 7, or where an open safety chain keeps the axis from listening to its controlword by one of
+        5040h (manual 5.15, table 8). Raises OvertakenError, AxisStateError, and what a write raises.
+        """
+        if await self.status() & REMOTE:
+            self.word(Word.SHUTDOWN)
+            self.word(Word.FAULT_RESET)
+            self.word(Word.SHUTDOWN)
+        else:
+            self.require_own()
+            for data in (b"\x80", b"\0"):
+                await self.driver.write(self.target.node, MANUAL, data, verify=Verify.ACK)
+        return await self._reset_done()
+
+    async def _reset_done(self) -> AxisState:
+        """Wait until the axis listens again and has no fault, or until it is clear that it will not."""
+        end_s = asyncio.get_running_loop().time() + RESET_TIMEOUT_S
+        while True:
+            state = await self.state()
+            listens = await self.status() & REMOTE
+            free = listens and state not in (AxisState.FAULT, AxisState.FAULT_REACTION_ACTIVE)
+            if free or asyncio.get_running_loop().time() >= end_s:
+                return state
+            await asyncio.sleep(_LOOK_S)

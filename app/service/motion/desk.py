@@ -1,0 +1,531 @@
+"""The desk from which the axes of one connection are moved: lease, dead man, preparation and the motion under way.
+
+One axis moves at a time, and only while its person holds it: let go, and it halts by its ramp; silent, and it stops by
+its quick stop. Then it has no power, and its brake is engaged. Whatever raises, hangs or is cancelled here, the drive
+misses our heartbeat and stops by itself. STOP and FEATHER never come through here; they end what is under way.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Awaitable, Callable
+from contextlib import suppress
+from dataclasses import dataclass, field
+from enum import Enum
+from time import monotonic
+from typing import Final
+
+from app.drivers.contract import LinkState
+from app.errors import (
+    HubsideError,
+    InterlockError,
+    NotConnectedError,
+    NotHeldError,
+    NotPreparedError,
+    OldOrderError,
+    OvertakenError,
+    UsageError,
+)
+from app.model.axis_state import AxisState
+from app.service.connection import Connection
+from app.service.devices import Target
+from app.service.journal import Journal, Kind
+from app.service.motion import interlocks, preparation
+from app.service.motion.control import Control, Word
+from app.service.motion.dead_man import SILENCE_S, DeadMan
+from app.service.motion.heartbeat import Heartbeat
+from app.service.motion.interlocks import Confirmed, Standing
+from app.service.motion.lease import Holder, Lease
+from app.service.motion.left import Left
+from app.service.motion.preparation import Prepared
+from app.service.stop import CONTROLWORD, is_axis
+
+log = logging.getLogger(__name__)
+
+TICK_S: Final = 0.02
+OBEY_S: Final = 0.25
+"""An axis that is still enabled so long after a quick stop has not heard it."""
+CLOSE_S: Final = 8.0
+
+
+class Doing(Enum):
+    """What is under way at an axis; the value is the end of its text key ``motion.doing.…``."""
+
+    PREPARING = "preparing"
+    PUTTING_BACK = "putting_back"
+    JOG = "jog"
+    MOVE = "move"
+    HOMING = "homing"
+    RESET = "reset"
+
+
+class Ended(Enum):
+    """Why a motion ended; the value is the end of its text key ``motion.ended.…``."""
+
+    DONE = "done"
+    RELEASED = "released"
+    SILENT = "silent"
+    LEASE = "lease"
+    LINK = "link"
+    LIMIT = "limit"
+    STOPPED = "stopped"
+    FAILED = "failed"
+
+
+_STOPPED: Final = (Ended.SILENT, Ended.LEASE, Ended.LINK)
+"""A quick stop was sent already."""
+
+
+@dataclass
+class Running:
+    """A motion under way.
+
+    ``held``: it goes on only while its person holds it; ``turning``: the axis was told to run.
+    """
+
+    slug: str
+    doing: Doing
+    control: Control
+    held: bool
+    order: int = 0
+    turning: bool = False
+    why: Ended | None = None
+    task: asyncio.Task[None] | None = None
+    over: asyncio.Event = field(default_factory=asyncio.Event)
+
+    def end(self, why: Ended) -> None:
+        """It ends now, for the first reason that there was."""
+        if self.why is None:
+            self.why = why
+        self.over.set()
+
+
+@dataclass(frozen=True, slots=True)
+class Last:
+    """The latest motion: axis, what, why it ended, and the error where it failed."""
+
+    slug: str
+    doing: Doing
+    why: Ended
+    error: HubsideError | None
+
+
+class MotionDesk:
+    """The desk of ``connection``. It looks after the dead man from the first lease on; ``close`` ends all of it."""
+
+    def __init__(
+        self,
+        connection: Connection,
+        journal: Journal,
+        left: Left | None = None,
+        now_s: Callable[[], float] = monotonic,
+    ) -> None:
+        self.connection = connection
+        self.left = left or Left()
+        self.lease = Lease(now_s, lambda: connection.stamper() // 1000)
+        self.dead_man = DeadMan(now_s)
+        self.confirmed = Confirmed()
+        self.running: Running | None = None
+        self.last: Last | None = None
+        self.prepared: dict[str, Prepared] = {}
+        self._journal = journal
+        self.now_s = now_s
+        self.now_ns = connection.stamper
+        self._order = 0
+        self._closed = False
+        self._heartbeats = {
+            bus.name: Heartbeat(connection.buses[bus.name].driver, bus.heartbeat_node, now_s)
+            for bus in connection.turbine.buses
+            if bus.heartbeat_node is not None
+        }
+        self._reconnects: dict[str, int] = {}
+        self._ticker: asyncio.Task[None] | None = None
+        self._changing = asyncio.Lock()
+        self._chores: set[asyncio.Task[None]] = set()
+
+    # -- looking after it ---------------------------------------------------------------
+
+    async def close(self) -> None:
+        """Stop what moves, put back what was prepared as far as the devices answer, and end."""
+        self._closed = True
+        self._end_running(Ended.LEASE)
+        running = self.running
+        if running is not None and running.task is not None:
+            await asyncio.wait({running.task}, timeout=3.0)
+        with suppress(TimeoutError):
+            await asyncio.wait_for(self._put_all_back(), CLOSE_S)
+        for task in (self._ticker, *self._chores):
+            if task is not None:
+                task.cancel()
+                await asyncio.gather(task, return_exceptions=True)
+
+    def _look_after(self) -> None:
+        if self._ticker is None or self._ticker.done():
+            self._ticker = asyncio.create_task(self._tick_on())
+            self._ticker.add_done_callback(_tell_failure)
+
+    async def _tick_on(self) -> None:
+        """As long as somebody could move something, or an axis watches our heartbeat."""
+        while self.lease.holder is not None or self.running is not None or self.prepared:
+            self.tick()
+            await asyncio.sleep(TICK_S)
+
+    def tick(self) -> None:
+        """One turn: the dead man first, then our heartbeats, then the lease."""
+        running = self.running
+        if running is not None and running.held and not running.over.is_set():
+            if not self.dead_man.present:
+                self._stop_running(running, Ended.SILENT)
+            elif not self.dead_man.holds(running.order):
+                self._halt_running(running)
+        for name, heartbeat in self._heartbeats.items():
+            if self._is_interrupted(name) and heartbeat.cut():
+                self._link_lost(name)
+            heartbeat.tick()
+        if self.lease.tick(running is not None):
+            self._lease_changed()
+
+    def _is_interrupted(self, bus: str) -> bool:
+        """The link is down, or was since the last turn."""
+        status = self.connection.buses[bus].status
+        before = self._reconnects.get(bus, status.reconnects)
+        self._reconnects[bus] = status.reconnects
+        return status.state is not LinkState.CONNECTED or status.reconnects != before
+
+    def _link_lost(self, bus: str) -> None:
+        """The drives on it stop by themselves, for our heartbeat does not come again; each must prove it anew."""
+        running = self.running
+        if running is not None and running.control.target.device.bus == bus:
+            self._stop_running(running, Ended.LINK)
+        for axis in self.prepared.values():
+            if axis.control.target.device.bus == bus:
+                axis.proof_s = None
+
+    def page_gone(self, page: str) -> None:
+        """The socket of a page is closed: who held by it holds nothing any more."""
+        holder = self.lease.holder
+        running = self.running
+        if holder is not None and holder.page == page and running is not None and running.held:
+            self._stop_running(running, Ended.SILENT)
+
+    def beat(self, page: str, fence: int, number: int, holding: bool, order: int = 0) -> None:
+        """A beat of the dead man came from a page; who lets go is heard at once."""
+        holder = self.lease.holder
+        if holder is None or holder.page != page or not self.dead_man.beat(fence, number, holding, order):
+            return
+        self.lease.heard(page)
+        running = self.running
+        if (
+            running is not None
+            and running.held
+            and not running.over.is_set()
+            and not self.dead_man.holds(running.order)
+        ):
+            self._halt_running(running)
+
+    def _halt_running(self, running: Running) -> None:
+        """Let go: the axis halts by its ramp. One that does not run yet would be enabled by that word."""
+        if not running.turning:
+            running.end(Ended.RELEASED)
+            return
+        try:
+            running.control.word(Word.HALT)
+            running.end(Ended.RELEASED)
+        except OvertakenError:  # STOP or FEATHER has it now
+            running.end(Ended.STOPPED)
+        except HubsideError as error:
+            log.warning("%s: halt was not sent: %s", running.slug, error.code)
+            self._stop_running(running, Ended.RELEASED)
+
+    def _stop_running(self, running: Running, why: Ended) -> None:
+        """Nobody is there: quick stop, at once, by whatever way there is; a person's STOP or FEATHER stays in force."""
+        running.end(why)
+        self.dead_man.release()
+        try:
+            by_pdo = running.control.stop()
+        except HubsideError as error:  # the link is lost: the drive stops by itself
+            log.warning("%s: quick stop was not sent: %s", running.slug, error.code)
+            return
+        if not by_pdo:
+            self._chore(running.control.stop_by_sdo())
+        self._chore(self._see_off(running.control))
+        self._journal.note(Kind.MOTION_STOPPED, running.slug, reason=why.value)
+
+    async def _see_off(self, control: Control) -> None:
+        """A quick stop that the axis does not obey is written, and our heartbeat ends until it has no power."""
+        heartbeat = self._heartbeats[control.target.device.bus]
+        slug = control.target.slug
+        try:
+            await asyncio.sleep(OBEY_S)
+            if control.overtaken or await control.state() is not AxisState.OPERATION_ENABLED:
+                return
+        except HubsideError as error:
+            log.warning("%s: whether it stops is not known: %s", slug, error.code)
+        heartbeat.withhold(slug)
+        await control.stop_by_sdo()
+        if await control.until_off(preparation.OFF_TIMEOUT_S):
+            heartbeat.go_on(slug)
+
+    def _end_running(self, why: Ended) -> None:
+        if self.running is not None:
+            self._stop_running(self.running, why)
+
+    def _chore(self, work: Awaitable[None]) -> None:
+        async def run() -> None:
+            try:
+                await work
+            except HubsideError as error:
+                log.warning("motion: %s: %s", error.code, error)
+
+        task = asyncio.ensure_future(run())
+        self._chores.add(task)
+        task.add_done_callback(self._chores.discard)
+
+    # -- lease -----------------------------------------------------------------------------
+
+    def take_lease(self, person: str, page: str) -> Holder:
+        """Have the lease, or keep it. Raises LeaseHeldError."""
+        before = self.lease.holder
+        holder = self.lease.take(person, page)
+        if before is None or before.fence != holder.fence:
+            self._lease_changed()
+        return holder
+
+    def ask_for_lease(self, person: str, page: str) -> None:
+        """Ask its holder for it. Raises LeaseHeldError where somebody else asks already."""
+        before = self.lease.holder
+        self.lease.ask(person, page)
+        after = self.lease.holder
+        if after is not None and (before is None or before.fence != after.fence):
+            self._lease_changed()
+
+    def withdraw_wish(self, page: str) -> None:
+        """Whoever asked does not want it any more."""
+        self.lease.withdraw(page)
+
+    def answer_wish(self, fence: int, hand_over: bool) -> None:
+        """The holder's answer to who asks. Raises LeaseNeededError, LeaseError."""
+        before = self.lease.holder
+        self.lease.answer(fence, hand_over)
+        if before is None or self.lease.holder is None or before.fence != self.lease.holder.fence:
+            self._lease_changed()
+
+    def give_back_lease(self, fence: int) -> None:
+        """End the lease: what was prepared is put back. Raises LeaseNeededError, LeaseError."""
+        self.lease.give_back(fence)
+        self._lease_changed()
+
+    def _lease_changed(self) -> None:
+        """Another one has it, or nobody: what was held is not any more, and nothing stays prepared or confirmed."""
+        self._look_after()
+        self._end_running(Ended.LEASE)
+        holder = self.lease.holder
+        self.confirmed = Confirmed()
+        self._order = 0
+        self.dead_man.start(0 if holder is None else holder.fence)
+        if holder is None:
+            self._journal.note(Kind.LEASE_ENDED)
+        else:
+            self._journal.by(holder.person).note(Kind.LEASE_TAKEN)
+        for axis in self.prepared.values():
+            axis.proof_s = None  # at once: what is being put back must not move meanwhile
+        if self.prepared:
+            self._chore(self._put_all_back())
+
+    def admit(self, fence: int, order: int) -> None:
+        """An order has come; those of a page have rising numbers.
+
+        Raises LeaseNeededError, LeaseError, OldOrderError.
+        """
+        self.lease.check(fence)
+        if order <= self._order:
+            raise OldOrderError(order=order, latest=self._order)
+        self._order = order
+
+    def confirm(self, fence: int, confirmed: Confirmed) -> None:
+        """What the holder has looked at. Raises LeaseNeededError, LeaseError."""
+        self.lease.check(fence)
+        self.confirmed = confirmed
+
+    # -- interlocks and preparation ------------------------------------------------------------
+
+    async def interlocks(self, slug: str) -> list[Standing]:
+        """How every interlock of an axis stands. Raises UsageError."""
+        target = self._axis(slug)
+        heartbeat = self._heartbeats.get(target.device.bus)
+        return await interlocks.look(self.connection, target, heartbeat, self.confirmed)
+
+    async def require_clear(self, slug: str) -> None:
+        """Raises InterlockError for the first interlock that holds the axis back."""
+        for standing in await self.interlocks(slug):
+            if standing.holds_back:
+                reason = ", ".join(f"{name} {value}" for name, value in standing.details.items()) or "–"
+                raise InterlockError(device=slug, interlock=standing.interlock.value, reason=reason)
+
+    async def prepare(self, slug: str, fence: int) -> Prepared:
+        """Set an axis up and have it prove that it stops by itself; held all the while.
+
+        Raises LeaseError and its like, InterlockError, NotHeldError, and what a write raises. Where it fails, what was
+        changed is put back.
+        """
+        known = self.prepared.get(slug)
+        control = self._control(self._axis(slug)) if known is None else known.control
+
+        async def work(running: Running) -> None:
+            heartbeat = self._heartbeats[control.target.device.bus]
+            axis = Prepared(control)
+            try:
+                async with self._changing:  # the settings of an earlier lease may just be put back
+                    if known is not None:
+                        axis.started, axis.nmt_before = known.started, known.nmt_before
+                    self.prepared[slug] = axis  # another one: who puts the earlier one back finds it gone
+                    await preparation.set_up(axis, heartbeat, self.left, journal)
+                await preparation.prove(axis, heartbeat, lambda: not running.over.is_set())
+                running.held = False  # the axis has no power of ours any more
+                await preparation.after_proof(control)
+            except BaseException:
+                await asyncio.shield(self._put_back(axis, journal))
+                raise
+            journal.note(Kind.MOTION_PREPARED, slug, proof_ms=round(1000 * (axis.proof_s or 0.0)))
+
+        journal = self._journal.by(self.lease.check(fence).person)
+        await self._run(slug, fence, Doing.PREPARING, control, work, held=True)
+        return self.prepared[slug]
+
+    async def put_back(self, slug: str, fence: int) -> None:
+        """End the preparation of an axis, also one of a server that was killed: its old values stand again.
+
+        Raises LeaseError and its like, InterlockError while it moves, and what a write raises.
+        """
+        journal = self._journal.by(self.lease.check(fence).person)
+        self._require_idle()
+        axis = self.prepared.get(slug)
+        control = self._control(self._axis(slug)) if axis is None else axis.control
+        running = self.running = Running(slug, Doing.PUTTING_BACK, control, held=False)
+        try:
+            if axis is not None:
+                await self._put_back(axis, journal)
+            else:
+                await preparation.put_back(control, self.left, journal)
+        finally:
+            if self.running is running:
+                self.running = None
+
+    async def _put_back(self, axis: Prepared, journal: Journal) -> None:
+        heartbeat = self._heartbeats[axis.control.target.device.bus]
+        axis.proof_s = None  # before anything is written: it must not move any more
+        async with self._changing:
+            if self.prepared.get(axis.slug) is not axis:
+                return
+            await preparation.put_back(axis.control, self.left, journal)
+            preparation.leave(axis, heartbeat, journal)
+            self.prepared.pop(axis.slug, None)
+        journal.note(Kind.MOTION_PUT_BACK, axis.slug)
+
+    async def _put_all_back(self) -> None:
+        running = self.running
+        if running is not None and running.task is not None:
+            await asyncio.wait({running.task}, timeout=3.0)
+        for axis in list(self.prepared.values()):
+            try:
+                await self._put_back(axis, self._journal)
+            except HubsideError as error:
+                log.warning("%s: what was prepared is not put back: %s", axis.slug, error.code)
+
+    # -- motion ---------------------------------------------------------------------------------
+
+    async def move(
+        self, slug: str, fence: int, doing: Doing, work: Callable[[Running], Awaitable[None]], held: bool = True
+    ) -> None:
+        """Let ``work`` command a prepared axis. Raises what ``_run`` raises, NotPreparedError."""
+        axis = self.prepared.get(slug)
+        self.lease.check(fence)
+        if axis is None or axis.proof_s is None:
+            raise NotPreparedError(device=slug)
+
+        async def checked(running: Running) -> None:
+            await preparation.check(axis)
+            if axis.proof_s is None or self.prepared.get(slug) is not axis:
+                raise NotPreparedError(device=slug)
+            await work(running)
+
+        await self._run(slug, fence, doing, axis.control, checked, held)
+
+    async def _run(
+        self,
+        slug: str,
+        fence: int,
+        doing: Doing,
+        control: Control,
+        work: Callable[[Running], Awaitable[None]],
+        held: bool,
+    ) -> None:
+        """Run what commands an axis to its end.
+
+        Raises LeaseError and its like, InterlockError, NotHeldError, OvertakenError, AxisStateError, and what reading
+        and writing raise.
+        """
+        holder, order = self.lease.check(fence), self._order
+        self._require_idle()
+        control.own()  # from here on: whoever presses STOP while this waits has pressed it later
+        if held and not await self._is_held(order):
+            raise NotHeldError(device=slug)
+        self._require_idle()
+        running = self.running = Running(slug, doing, control, held, order)
+        journal = self._journal.by(holder.person)
+        error: HubsideError | None = None
+        try:
+            await self.require_clear(slug)
+            self.lease.check(fence)
+            if running.over.is_set():
+                raise NotHeldError(device=slug)
+            journal.note(Kind.MOTION_BEGUN, slug, what=doing.value)
+            running.task = asyncio.ensure_future(_as_none(work(running)))
+            await asyncio.shield(running.task)
+            running.end(Ended.DONE)
+        except BaseException as failed:  # whatever it is: nobody looks after the axis any more
+            error = failed if isinstance(failed, HubsideError) else None
+            if running.why not in _STOPPED:
+                self._stop_running(running, Ended.FAILED)
+            running.end(Ended.FAILED)
+            raise
+        finally:
+            self.running = None
+            self.dead_man.release()
+            why = running.why or Ended.FAILED
+            self.last = Last(slug, doing, why, error)
+            journal.note(Kind.MOTION_ENDED, slug, what=doing.value, reason=why.value)
+
+    def _require_idle(self) -> None:
+        if self._closed:
+            raise NotConnectedError
+        if self.running is not None:
+            raise InterlockError(device=self.running.slug, interlock="running", reason=self.running.doing.value)
+
+    async def _is_held(self, order: int) -> bool:
+        """Whether it is held. An order may be ahead of the beat that was sent before it, on another connection."""
+        end_s = self.now_s() + SILENCE_S
+        while not self.dead_man.holds(order) and self.now_s() < end_s:  # noqa: ASYNC110  the socket has no event for it
+            await asyncio.sleep(TICK_S)
+        return self.dead_man.holds(order)
+
+    def _axis(self, slug: str) -> Target:
+        target = self.connection.target(slug)
+        if not is_axis(target):
+            raise UsageError(reason=f"{slug} is no axis")
+        return target
+
+    def _control(self, target: Target) -> Control:
+        link = self.connection.buses[target.device.bus]
+        return Control(link.driver, target, lambda data: link.send_pdo(target.node, CONTROLWORD, data))
+
+
+def _tell_failure(ticker: asyncio.Task[None]) -> None:
+    """Nobody looks after the dead man any more; our heartbeat has ended with it, so every drive stops by itself."""
+    if not ticker.cancelled() and (error := ticker.exception()) is not None:
+        log.error("the desk has failed", exc_info=error)
+
+
+async def _as_none(work: Awaitable[None]) -> None:
+    await work

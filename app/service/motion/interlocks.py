@@ -1,0 +1,134 @@
+"""What keeps an axis from moving, each with its reason, to be seen before it bites."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any, Final
+
+from app.drivers.contract import LinkState
+from app.errors import HubsideError
+from app.model.address import Address
+from app.model.rules.rule import Severity
+from app.model.station import station_slug
+from app.recording.writer import RecorderState
+from app.service.bus_link import BusLink
+from app.service.connection import Connection
+from app.service.devices import Target
+from app.service.motion.heartbeat import Heartbeat
+from app.service.restore.precheck import MASTER_QUIET_NS
+from app.service.rule_check import check_live
+from app.service.stop import is_axis
+from app.service.views import AxisLine, axis_lines
+
+POSITION: Final = Address(0x6064)
+ASK_TIMEOUT_S: Final = 0.5
+FEATHER_DEG: Final = 75.0
+"""A blade at this angle or beyond is in feather: the rotor does not take up wind by it."""
+
+
+class Interlock(Enum):
+    """The value is the end of its text keys ``interlock.…``."""
+
+    CONNECTED = "connected"
+    ROTOR_LOCKED = "rotor_locked"
+    PEOPLE_OUT = "people_out"
+    OTHERS_FEATHERED = "others_feathered"
+    RULES = "rules"
+    NO_RESTORE = "no_restore"
+    NO_MASTER = "no_master"
+    RECORDING = "recording"
+    HEARTBEAT_NODE = "heartbeat_node"
+
+
+@dataclass(frozen=True, slots=True)
+class Standing:
+    """How one interlock stands; ``details`` fill its text."""
+
+    interlock: Interlock
+    holds_back: bool
+    details: Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Confirmed:
+    """What a person has looked at and says."""
+
+    rotor_locked: bool = False
+    people_out: bool = False
+
+
+async def look(
+    connection: Connection, target: Target, heartbeat: Heartbeat | None, confirmed: Confirmed
+) -> list[Standing]:
+    """How every interlock of an axis stands now. Of blades that nobody has looked at lately the angle is asked."""
+    await _ask_others(connection, target)
+    link = connection.buses[target.device.bus]
+    status = link.status
+    state = None if connection.recording is None else connection.recording.status().state
+    return [
+        Standing(Interlock.CONNECTED, status.state is not LinkState.CONNECTED, {"bus": link.name}),
+        Standing(Interlock.ROTOR_LOCKED, not confirmed.rotor_locked, {}),
+        Standing(Interlock.PEOPLE_OUT, not confirmed.people_out, {}),
+        _others(connection, target),
+        _rules(connection.targets, target),
+        await _restore(connection, target),
+        _masters(link, connection.stamper()),
+        Standing(Interlock.RECORDING, state is not RecorderState.RECORDING, {}),
+        Standing(
+            Interlock.HEARTBEAT_NODE,
+            heartbeat is None or heartbeat.seen,
+            {"node": "–" if heartbeat is None else heartbeat.node},
+        ),
+    ]
+
+
+def _masters(link: BusLink, now_ns: int) -> Standing:
+    seen = [one.sign.value for one in link.status.masters if now_ns - one.t_ns < MASTER_QUIET_NS]
+    return Standing(
+        Interlock.NO_MASTER, bool(seen) or link.needs_consent, {"seen": ", ".join(dict.fromkeys(seen)) or "–"}
+    )
+
+
+async def _ask_others(connection: Connection, target: Target) -> None:
+    """A blade that does not answer stays not known: that holds back too."""
+    lines = axis_lines(connection.turbine, {one.slug: one for one in connection.targets}, connection.stamper())
+    stale = {line.station for line in lines if line.stale} - {station_slug(target.slug)}
+    asked = [one for one in connection.targets if station_slug(one.slug) in stale and is_axis(one)]
+    await asyncio.gather(
+        *(connection.driver(one).read(one.node, POSITION, ASK_TIMEOUT_S) for one in asked), return_exceptions=True
+    )
+
+
+def _others(connection: Connection, target: Target) -> Standing:
+    """All other blades are known to be in feather."""
+    by_slug = {one.slug: one for one in connection.targets}
+    own = station_slug(target.slug)
+    lines = [
+        line
+        for line in axis_lines(connection.turbine, by_slug, connection.stamper())
+        if line.station != own and _has_axis(connection, line)
+    ]
+    out = [line for line in lines if line.stale or line.position_deg is None or line.position_deg < FEATHER_DEG]
+    blades = ", ".join(str(line.blade) for line in out) or "–"
+    return Standing(Interlock.OTHERS_FEATHERED, bool(out), {"blades": blades, "angle": FEATHER_DEG})
+
+
+def _has_axis(connection: Connection, line: AxisLine) -> bool:
+    return any(station_slug(one.slug) == line.station and is_axis(one) for one in connection.targets)
+
+
+def _rules(targets: Iterable[Target], target: Target) -> Standing:
+    judged = check_live(targets, {}, station_slug(target.slug))
+    errors = sum(one.broken(Severity.ERROR) for one in judged)
+    return Standing(Interlock.RULES, errors > 0, {"count": errors})
+
+
+async def _restore(connection: Connection, target: Target) -> Standing:
+    try:
+        await target.pass_gate(connection.driver(target))
+    except HubsideError as error:
+        return Standing(Interlock.NO_RESTORE, True, {"reason": error.code})
+    return Standing(Interlock.NO_RESTORE, False, {"reason": "–"})

@@ -1,0 +1,238 @@
+"""What an axis can be told to do at the desk: jog, move to an angle, home, reset its fault."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Final
+
+from app.errors import LimitError, UnverifiedError
+from app.model.address import Address
+from app.model.axis_state import AxisState
+from app.model.checks import Allow
+from app.model.datatypes import Raw
+from app.model.values import parse, to_scaled
+from app.service.devices import Target
+from app.service.journal import Journal, Kind
+from app.service.motion.control import (
+    ACKNOWLEDGED,
+    TARGET_REACHED,
+    AxisMode,
+    Control,
+    Word,
+)
+from app.service.motion.desk import Doing, Ended, MotionDesk, Running
+from app.service.motion.interlocks import POSITION
+from app.service.write import know_what_it_rests_on, write_raw
+
+TARGET_POSITION: Final = Address(0x607A)
+TARGET_VELOCITY: Final = Address(0x60FF)
+PROFILE_VELOCITY: Final = Address(0x6081)
+LOWEST: Final = Address(0x607D, 1)
+HIGHEST: Final = Address(0x607D, 2)
+MOST_DPS: Final = 5.0
+"""The fastest that a person moves a blade by hand."""
+_LOOK_S: Final = 0.02
+_HOME_TOLERANCE_DEG: Final = 0.1
+_MARGIN_S: Final = 0.25
+"""A jog ends so long before the software limit: what the ramp and the last look take."""
+
+
+async def jog(desk: MotionDesk, slug: str, fence: int, speed_dps: float, journal: Journal) -> None:
+    """Turn the blade at a constant speed (profile velocity) as long as it is held, up to the software limits.
+
+    Degrees per second, negative towards 0. Raises LimitError, and what ``MotionDesk.move`` raises.
+    """
+    _require_speed(speed_dps)
+
+    async def work(running: Running) -> None:
+        control = running.control
+        raw = await _raw(control, TARGET_VELOCITY, speed_dps)
+        await control.set_mode(AxisMode.PROFILE_VELOCITY)
+        await _set(control, TARGET_VELOCITY, raw, journal)
+        if running.over.is_set():
+            return
+        try:
+            await control.enable()
+            if not running.over.is_set():
+                running.turning = True
+                control.word(Word.RUN)
+                await _until_limit(running, speed_dps)
+        finally:
+            await _come_to_rest(running)
+
+    await desk.move(slug, fence, Doing.JOG, work)
+
+
+async def move_to(
+    desk: MotionDesk, slug: str, fence: int, angle_deg: float, speed_dps: float, journal: Journal
+) -> None:
+    """Move the blade to an angle (profile position) while it is held; let go, it halts on its way.
+
+    Raises LimitError, and what ``MotionDesk.move`` raises.
+    """
+    _require_speed(speed_dps)
+
+    async def work(running: Running) -> None:
+        control = running.control
+        await _require_within(control, angle_deg)
+        await control.set_mode(AxisMode.PROFILE_POSITION)
+        await _set(control, PROFILE_VELOCITY, await _raw(control, PROFILE_VELOCITY, abs(speed_dps)), journal)
+        await _set(control, TARGET_POSITION, await _raw(control, TARGET_POSITION, angle_deg), journal)
+        if running.over.is_set():
+            return
+        try:
+            await control.enable()
+            if not running.over.is_set():
+                running.turning = True
+                control.word(Word.RUN)
+                control.word(Word.NEW_SET_POINT)
+                await control.until_bits(ACKNOWLEDGED, True)
+                if not running.over.is_set():
+                    control.word(Word.RUN)
+                    await _until_reached(running)
+        finally:
+            await _come_to_rest(running)
+
+    await desk.move(slug, fence, Doing.MOVE, work)
+
+
+async def reset_fault(desk: MotionDesk, slug: str, fence: int, journal: Journal) -> AxisState:
+    """Reset the fault of a prepared axis; the state that came of it. Nothing moves by it."""
+    found: list[AxisState] = []
+
+    async def work(running: Running) -> None:
+        found.append(await running.control.reset_fault())
+        journal.note(Kind.FAULT_RESET, slug, state=found[0].name.lower())
+
+    await desk.move(slug, fence, Doing.RESET, work, held=False)
+    return found[0]
+
+
+async def home(desk: MotionDesk, slug: str, fence: int, angle_deg: float, journal: Journal) -> None:
+    """Take the present position of an axis without power for ``angle_deg`` (homing method 35, manual 5.14).
+
+    Raises what ``MotionDesk.move`` raises, AxisStateError where the axis does not confirm it, UnverifiedError where it
+    stands elsewhere by its own word: the bits that confirm may be those of an earlier time.
+    """
+
+    async def work(running: Running) -> None:
+        control = running.control
+        await control.set_mode(AxisMode.HOMING)
+        await _set(control, TARGET_POSITION, await _raw(control, TARGET_POSITION, angle_deg), journal)
+        control.word(Word.SHUTDOWN)
+        await control.until({AxisState.READY})
+        control.word(Word.HOME)
+        await control.until_bits(ACKNOWLEDGED | TARGET_REACHED, True)
+        control.word(Word.SHUTDOWN)
+        await _require_at(control, angle_deg)
+        journal.note(Kind.HOMED, slug, angle_deg=angle_deg)
+
+    await desk.move(slug, fence, Doing.HOMING, work, held=False)
+
+
+# -- steps ------------------------------------------------------------------------------------
+
+
+async def _until_limit(running: Running, speed_dps: float) -> None:
+    """Wait until it is let go, or until the blade comes near the limit towards which it turns."""
+    control = running.control
+    low_deg, high_deg = await _degrees(control, LOWEST), await _degrees(control, HIGHEST)
+    while not running.over.is_set():
+        ahead_deg = await _degrees(control, POSITION) + speed_dps * _MARGIN_S
+        if (speed_dps < 0 and ahead_deg <= low_deg) or (speed_dps > 0 and ahead_deg >= high_deg):
+            running.end(Ended.LIMIT)
+            return
+        if control.overtaken or await control.state() is not AxisState.OPERATION_ENABLED:
+            running.end(Ended.STOPPED)
+            return
+        await _wait(running)
+
+
+async def _until_reached(running: Running) -> None:
+    while not running.over.is_set():
+        status = await running.control.status()
+        if running.control.overtaken or AxisState.of(status) is not AxisState.OPERATION_ENABLED:
+            running.end(Ended.STOPPED)
+        elif status & TARGET_REACHED and not status & ACKNOWLEDGED:
+            running.end(Ended.DONE)
+        else:
+            await _wait(running)
+
+
+async def _wait(running: Running) -> None:
+    try:
+        await asyncio.wait_for(running.over.wait(), _LOOK_S)
+    except TimeoutError:
+        return
+
+
+async def _come_to_rest(running: Running) -> None:
+    """Halt, wait until the blade stands, then no power and the brake engaged.
+
+    Where a quick stop is under way, or somebody else has commanded the axis, it is left to that.
+    """
+    control = running.control
+    if running.why in (Ended.SILENT, Ended.LEASE, Ended.LINK, Ended.STOPPED):
+        return
+    control.word(Word.HALT)
+    await control.until_still()
+    await control.switch_off()
+
+
+async def _require_at(control: Control, angle_deg: float) -> None:
+    found_deg = await _degrees(control, POSITION)
+    if abs(found_deg - angle_deg) > _HOME_TOLERANCE_DEG:
+        raise UnverifiedError(
+            address=POSITION.short,
+            name=control.target.entry(POSITION).title,
+            sent=f"{angle_deg:g}",
+            found=f"{found_deg:g}",
+            reason="the axis confirmed it and stands elsewhere",
+        )
+
+
+async def _set(control: Control, address: Address, raw: Raw, journal: Journal) -> None:
+    await write_raw(control.driver, control.target, address, raw, journal, allow=Allow.MOTION)
+
+
+async def _raw(control: Control, address: Address, number: float) -> Raw:
+    target = control.target
+    entry = target.entry(address)
+    await know_what_it_rests_on(control.driver, target, entry)
+    return parse(target.description, entry, f"{number:.3f}".rstrip("0").rstrip("."), target.lookup)
+
+
+async def _degrees(control: Control, address: Address) -> float:
+    entry = control.target.entry(address)
+    found = to_scaled(entry, await control.number(address), control.target.lookup)
+    return 0.0 if found is None else float(found.number)
+
+
+async def _require_within(control: Control, angle_deg: float) -> None:
+    """Raises LimitError: the drive would adjust a target outside its limits and go there (manual 5.10)."""
+    low_deg, high_deg = await _degrees(control, LOWEST), await _degrees(control, HIGHEST)
+    if not low_deg <= angle_deg <= high_deg:
+        raise _beyond(control.target, TARGET_POSITION, angle_deg, low_deg, high_deg)
+
+
+def _beyond(target: Target, address: Address, number: float, low: float, high: float) -> LimitError:
+    return LimitError(
+        address=address.short,
+        name=target.entry(address).title,
+        value=f"{number:g}",
+        minimum=f"{low:g}",
+        maximum=f"{high:g}",
+        unit="°",
+    )
+
+
+def _require_speed(speed_dps: float) -> None:
+    if not 0 < abs(speed_dps) <= MOST_DPS:
+        raise LimitError(
+            address=TARGET_VELOCITY.short,
+            name="",
+            value=f"{speed_dps:g}",
+            minimum=-MOST_DPS,
+            maximum=MOST_DPS,
+            unit="°/s",
+        )

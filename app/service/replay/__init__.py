@@ -1,0 +1,1 @@
+"""Replay of recordings: one cursor for all who look, owned by the server. Nothing here can reach a device."""

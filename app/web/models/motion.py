@@ -1,0 +1,119 @@
+"""Types of the desk from which axes are moved."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from app.service.motion.interlocks import Standing
+
+Page = Annotated[str, Field(min_length=1, max_length=64)]
+"""Name that a page gives itself, new each time it is loaded."""
+Degrees = Annotated[float, Field(ge=-720, le=720, allow_inf_nan=False)]
+DegreesPerSecond = Annotated[float, Field(ge=-20, le=20, allow_inf_nan=False)]
+
+
+class LeaseRequest(BaseModel):
+    """Who wants the lease."""
+
+    model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{"page": "5f2c1d"}]})
+
+    page: Page
+
+
+class LeaseDoc(BaseModel):
+    """The lease of the page that asks: ``fence`` goes with every order and beat. None: it was asked for."""
+
+    fence: int | None
+
+
+class FenceRequest(BaseModel):
+    """What the holder of lease ``fence`` asks."""
+
+    model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{"fence": 1764029382123456}]})
+
+    fence: int
+
+
+class AnswerRequest(FenceRequest):
+    """The holder's answer to who asks for the lease."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [{"fence": 1764029382123456, "hand_over": True}]})
+
+    hand_over: bool
+
+
+class ConfirmRequest(FenceRequest):
+    """What the holder has looked at."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"examples": [{"fence": 1764029382123456, "rotor_locked": True, "people_out": True}]}
+    )
+
+    rotor_locked: bool
+    people_out: bool
+
+
+class OrderRequest(FenceRequest):
+    """An order to an axis; ``order`` rises with each one of a page, so that an old one does nothing."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [{"fence": 1764029382123456, "order": 1}]})
+
+    order: int
+
+
+class JogRequest(OrderRequest):
+    """Turn the blade at a speed while it is held; negative: towards 0 degrees."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"examples": [{"fence": 1764029382123456, "order": 2, "speed_dps": -2.0}]}
+    )
+
+    speed_dps: DegreesPerSecond
+
+
+class MoveRequest(OrderRequest):
+    """Move the blade to an angle while it is held."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"examples": [{"fence": 1764029382123456, "order": 3, "angle_deg": 45.0, "speed_dps": 2.0}]}
+    )
+
+    angle_deg: Degrees
+    speed_dps: DegreesPerSecond
+
+
+class HomeRequest(OrderRequest):
+    """Take the present position for this angle."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"examples": [{"fence": 1764029382123456, "order": 4, "angle_deg": 90.0}]}
+    )
+
+    angle_deg: Degrees
+
+
+class InterlockDoc(BaseModel):
+    """How an interlock stands; ``details`` fill its texts ``interlock.<name>.clear`` and ``.bites``."""
+
+    name: str
+    holds_back: bool
+    details: dict[str, Any]
+
+    @classmethod
+    def of(cls, standing: Standing) -> InterlockDoc:
+        """The document of one."""
+        return cls(name=standing.interlock.value, holds_back=standing.holds_back, details=dict(standing.details))
+
+
+class PreparedDoc(BaseModel):
+    """The proof: so long after our last heartbeat the axis had stopped by itself."""
+
+    proof_ms: int
+
+
+class MovedDoc(BaseModel):
+    """How it ended; the end of a text key ``motion.ended``."""
+
+    why: str

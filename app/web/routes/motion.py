@@ -1,0 +1,152 @@
+"""Moving axes: the lease, what a person confirms, preparation, and orders that last as long as they are held.
+
+An order is answered when it has ended. What holds an axis is the beat on the socket, not the request.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Depends
+
+from app.errors import NotConnectedError
+from app.model.roles import Role
+from app.service.motion import moves
+from app.service.motion.desk import MotionDesk
+from app.service.motion.interlocks import Confirmed
+from app.service.motion.line import MotionLine, motion_line
+from app.web.deps import DEVICE, BenchOf, JournalOf, PersonOf, TargetOf, needs
+from app.web.models.motion import (
+    AnswerRequest,
+    ConfirmRequest,
+    FenceRequest,
+    HomeRequest,
+    InterlockDoc,
+    JogRequest,
+    LeaseDoc,
+    LeaseRequest,
+    MovedDoc,
+    MoveRequest,
+    OrderRequest,
+    PreparedDoc,
+)
+
+router = APIRouter()
+TECHNICIAN = needs(Role.TECHNICIAN)
+MOTION = DEVICE + "/motion"
+
+
+def get_desk(bench: BenchOf) -> MotionDesk:
+    """The desk of the connection. Raises NotConnectedError."""
+    if bench.motion is None:
+        raise NotConnectedError
+    return bench.motion
+
+
+DeskOf = Annotated[MotionDesk, Depends(get_desk)]
+
+
+@router.get("/live/motion")
+async def motion(bench: BenchOf) -> MotionLine:
+    """Who may move the axes, what is prepared and under way. The socket has it as topic ``motion``."""
+    return motion_line(bench.motion)
+
+
+@router.post("/live/motion/lease", dependencies=[TECHNICIAN])
+async def take_lease(desk: DeskOf, person: PersonOf, request: LeaseRequest) -> LeaseDoc:
+    """Take the lease, or keep it; another page's is refused with 409 ``lease_held``."""
+    return LeaseDoc(fence=desk.take_lease(person.person, request.page).fence)
+
+
+@router.post("/live/motion/lease/ask", dependencies=[TECHNICIAN])
+async def ask_for_lease(desk: DeskOf, person: PersonOf, request: LeaseRequest) -> LeaseDoc:
+    """Ask its holder for the lease. Once it is had, taking it tells its number."""
+    desk.ask_for_lease(person.person, request.page)
+    holder = desk.lease.holder
+    return LeaseDoc(fence=holder.fence if holder is not None and holder.page == request.page else None)
+
+
+@router.post("/live/motion/lease/withdraw", dependencies=[TECHNICIAN])
+async def withdraw_wish(desk: DeskOf, request: LeaseRequest) -> MotionLine:
+    """Ask for the lease no longer."""
+    desk.withdraw_wish(request.page)
+    return motion_line(desk)
+
+
+@router.post("/live/motion/lease/answer", dependencies=[TECHNICIAN])
+async def answer_wish(desk: DeskOf, request: AnswerRequest) -> MotionLine:
+    """The holder's answer to who asks: hand the lease over, or keep it."""
+    desk.answer_wish(request.fence, request.hand_over)
+    return motion_line(desk)
+
+
+@router.post("/live/motion/lease/give-back", dependencies=[TECHNICIAN])
+async def give_back_lease(desk: DeskOf, request: FenceRequest) -> MotionLine:
+    """End the lease; what was prepared is put back."""
+    desk.give_back_lease(request.fence)
+    return motion_line(desk)
+
+
+@router.post("/live/motion/confirm", dependencies=[TECHNICIAN])
+async def confirm(desk: DeskOf, request: ConfirmRequest) -> MotionLine:
+    """What the holder has looked at: the rotor is locked, and nobody is in the hub."""
+    desk.confirm(request.fence, Confirmed(request.rotor_locked, request.people_out))
+    return motion_line(desk)
+
+
+@router.get(MOTION + "/interlocks")
+async def interlocks(desk: DeskOf, target: TargetOf) -> list[InterlockDoc]:
+    """How every interlock of an axis stands."""
+    return [InterlockDoc.of(standing) for standing in await desk.interlocks(target.slug)]
+
+
+@router.post(MOTION + "/prepare", dependencies=[TECHNICIAN])
+async def prepare(desk: DeskOf, target: TargetOf, request: OrderRequest) -> PreparedDoc:
+    """Have the drive watch our heartbeat and prove that it stops without it. Held; its fault may feather the blades."""
+    desk.admit(request.fence, request.order)
+    axis = await desk.prepare(target.slug, request.fence)
+    return PreparedDoc(proof_ms=round(1000 * (axis.proof_s or 0.0)))
+
+
+@router.post(MOTION + "/put-back", dependencies=[TECHNICIAN])
+async def put_back(desk: DeskOf, target: TargetOf, request: OrderRequest) -> MotionLine:
+    """End the preparation: the settings from before stand again."""
+    desk.admit(request.fence, request.order)
+    await desk.put_back(target.slug, request.fence)
+    return motion_line(desk)
+
+
+@router.post(MOTION + "/jog", dependencies=[TECHNICIAN])
+async def jog(desk: DeskOf, target: TargetOf, journal: JournalOf, request: JogRequest) -> MovedDoc:
+    """Turn the blade as long as it is held."""
+    desk.admit(request.fence, request.order)
+    await moves.jog(desk, target.slug, request.fence, request.speed_dps, journal)
+    return _moved(desk)
+
+
+@router.post(MOTION + "/move", dependencies=[TECHNICIAN])
+async def move(desk: DeskOf, target: TargetOf, journal: JournalOf, request: MoveRequest) -> MovedDoc:
+    """Move the blade to an angle as long as it is held."""
+    desk.admit(request.fence, request.order)
+    await moves.move_to(desk, target.slug, request.fence, request.angle_deg, request.speed_dps, journal)
+    return _moved(desk)
+
+
+@router.post(MOTION + "/home", dependencies=[TECHNICIAN])
+async def home(desk: DeskOf, target: TargetOf, journal: JournalOf, request: HomeRequest) -> MovedDoc:
+    """Take the present position of an axis without power for an angle (homing method 35)."""
+    desk.admit(request.fence, request.order)
+    await moves.home(desk, target.slug, request.fence, request.angle_deg, journal)
+    return _moved(desk)
+
+
+@router.post(MOTION + "/reset", dependencies=[TECHNICIAN])
+async def reset(desk: DeskOf, target: TargetOf, journal: JournalOf, request: OrderRequest) -> MovedDoc:
+    """Reset the fault of the axis; nothing moves by it."""
+    desk.admit(request.fence, request.order)
+    await moves.reset_fault(desk, target.slug, request.fence, journal)
+    return _moved(desk)
+
+
+def _moved(desk: MotionDesk) -> MovedDoc:
+    return MovedDoc(why="" if desk.last is None else desk.last.why.value)

@@ -1,0 +1,280 @@
+"""From the press of STOP to the controlword on the bus, while the SDO channel is busy, against the ordinary SDO queue.
+
+The real thing: ``hubside serve`` beside twins in a process of their own. STOP is pressed as the page does, by a
+request; its frame is seen by another client of the same simulated bus. Meanwhile nothing else runs, or a backup of all
+six devices, or a save of 10 s at every axis; first while the nodes are pre-operational, so that the command goes by
+SDO, then while they are operational, by RPDO. The peer sends the same command through the queue of the same driver, as
+an ordinary write of 6040h: it waits for what runs before it. Both clocks are the host's monotonic one.
+
+Three axes are stopped by each press; the last of the three frames counts.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import statistics
+import tempfile
+import time
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import asynccontextmanager, suppress
+from pathlib import Path
+from typing import Final, NamedTuple
+
+import httpx
+
+from app.drivers.can_config import parse_can
+from app.drivers.canopen import CanOpenDriver
+from app.errors import HubsideError
+from app.model.address import Address
+from app.model.description import Verify
+from app.model.description_file import load_builtin
+from app.wire.frame import Can, Frame, Stamper
+from app.wire.nmt import NmtCommand
+from bench._priority import preferred
+from bench._process import Child
+from bench._result import Result
+from bench._site import write_site
+from bench.backup import wait_for
+
+TARGET: Final = 10.0
+LIMIT_S: Final = 0.050
+BITRATE: Final = 500_000
+AXES: Final = (11, 12, 13)
+SLUGS: Final = tuple(f"wtg-07/blade-{blade}/pmc" for blade in (1, 2, 3))
+CONTROLWORD: Final = Address(0x6040)
+QUICK_STOP: Final = (0x010B).to_bytes(2, "little")
+SAVE_MS: Final = 10_000
+MARGIN_S: Final = 30.0
+FIRST_LOOK_S: Final = 4.0
+"""The server reads all devices first."""
+_LOOK_S: Final = 0.05
+_SAVE: Final = Address(0x1010, 3)
+_RPDO1: Final = 0x200
+_SDO: Final = 0x600
+
+
+class Run(NamedTuple):
+    """Times in s from the press to the last frame."""
+
+    name: str
+    times_s: list[float]
+
+    @property
+    def p99_s(self) -> float:
+        """What 99 of 100 do not exceed."""
+        return sorted(self.times_s)[max(0, math.ceil(0.99 * len(self.times_s)) - 1)]
+
+
+def run(full: bool) -> Result:
+    """40 presses in each state, 5 beside saves, one by the peer; in the long form 200, 25 and three."""
+    return asyncio.run(measure(200, 3) if full else measure(40, 1))
+
+
+async def measure(presses: int, peers: int) -> Result:
+    """Serve, press, and look at the bus."""
+    with preferred() as scheduling, tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        faults = [f"eeprom_slow@0s,node={node},save_ms={SAVE_MS}" for node in AXES]
+        options = [part for fault in faults for part in ("--fault", fault)]
+        arguments = ("--json", "twin", "oat", "--can", "socketcand:127.0.0.1:0", "--bitrate", str(BITRATE), *options)
+        with Child("app.cli", *arguments, quiet=True) as twins:
+            address = str(twins.hear()["address"]).removeprefix("socketcand:")
+            await wait_for(address, {1, 2, 3, *AXES})
+            site = write_site(folder, address, BITRATE)
+            serving = ("--json", "--data", str(folder / "data"), "serve", "--site", str(site), "--port", "0")
+            with Child("app.cli", *serving, quiet=True) as server:
+                ours = await _ours(str(server.hear()["url"]), address, presses)
+                server.terminate()
+            peer = await _peer(address, peers)
+            twins.terminate()
+    worst = max(run.p99_s for run in ours)
+    short = [f"{run.name}: p99 {1e3 * run.p99_s:.1f} ms" for run in ours if run.p99_s > LIMIT_S]
+    return Result(
+        peer.p99_s / worst,
+        TARGET,
+        (
+            f"three axes, {BITRATE} bit/s, from the request to the last of three frames; scheduling: {scheduling}",
+            *(_line(run) for run in ours),
+            f"peer, {peer.name}: {', '.join(f'{each:.2f}' for each in peer.times_s)} s",
+        ),
+        tuple(short),
+    )
+
+
+def _line(run: Run) -> str:
+    return (
+        f"ours, {run.name}: median {1e3 * statistics.median(run.times_s):.1f} ms, p99 {1e3 * run.p99_s:.1f} ms, "
+        f"worst {1e3 * max(run.times_s):.1f} ms, {len(run.times_s)} presses; limit {1e3 * LIMIT_S:.0f} ms"
+    )
+
+
+class Watch:
+    """Another client of the bus: when a quick stop went to an axis, by PDO or SDO."""
+
+    def __init__(self, driver: CanOpenDriver) -> None:
+        self._driver = driver
+        self._seen: dict[int, float] = {}
+        self._all = asyncio.Event()
+        self._loop = asyncio.get_running_loop()
+
+    def hear(self, frames: list[Frame]) -> None:
+        """Called on the receive thread."""
+        now_s = time.monotonic()
+        for frame in frames:
+            can = frame.payload
+            if isinstance(can, Can) and (node := _stopped(can)) is not None:
+                self._loop.call_soon_threadsafe(self._note, node, now_s)
+
+    def _note(self, node: int, now_s: float) -> None:
+        self._seen.setdefault(node, now_s)
+        if len(self._seen) == len(AXES):
+            self._all.set()
+
+    async def last(self, timeout_s: float) -> float:
+        """When the last axis was told."""
+        async with asyncio.timeout(timeout_s):
+            await self._all.wait()
+        return max(self._seen.values())
+
+    def start(self, nodes: tuple[int, ...]) -> None:
+        """Have them operational, so that their RPDO is in force."""
+        for node in nodes:
+            self._driver.nmt(NmtCommand.START, node)
+
+    def clear(self) -> None:
+        """Begin anew."""
+        self._seen.clear()
+        self._all.clear()
+
+
+def _stopped(can: Can) -> int | None:
+    for node in AXES:
+        if can.can_id == _RPDO1 + node and can.data[:2] == QUICK_STOP:
+            return node
+        if can.can_id == _SDO + node and can.data[1:4] == b"\x40\x60\x00" and can.data[4:6] == QUICK_STOP:
+            return node
+    return None
+
+
+@asynccontextmanager
+async def _watching(address: str) -> AsyncIterator[Watch]:
+    driver = _driver(address)
+    await driver.connect()
+    watch = Watch(driver)
+    driver.subscribe(watch.hear)
+    try:
+        yield watch
+    finally:
+        await driver.close()
+
+
+def _driver(address: str) -> CanOpenDriver:
+    config = parse_can(f"socketcand:{address}@{BITRATE}")
+    driver = CanOpenDriver(config, Stamper(time.time_ns(), time.monotonic_ns), listen_s=0.0, consent=True)
+    pmc = load_builtin("oat-pmc")
+    for node in AXES:
+        driver.set_description(node, pmc)
+    return driver
+
+
+# -- ours -------------------------------------------------------------------------------------
+
+
+async def _ours(url: str, address: str, presses: int) -> list[Run]:
+    base = url.split("/?")[0]
+    async with (
+        httpx.AsyncClient(base_url=base, trust_env=False, timeout=MARGIN_S) as client,
+        _watching(address) as watch,
+    ):
+        await client.get(url)
+        await asyncio.sleep(FIRST_LOOK_S)
+        await client.post("/api/live/consent", json={})  # a page has asked for something before it stops anything
+        runs = []
+        for way in ("by SDO", "by RPDO"):
+            if way == "by RPDO":
+                watch.start(AXES)
+            page = _Busy(client)
+            for name, begin in (
+                ("alone", page.nothing),
+                ("beside a backup", page.backup),
+                ("beside saves", page.saves),
+            ):
+                times = presses // 8 if begin == page.saves else presses  # these take seconds each
+                times_s = [await _press(client, watch, begin) for _ in range(times)]
+                runs.append(Run(f"{way}, {name}", times_s))
+            await page.end()
+        return runs
+
+
+async def _press(client: httpx.AsyncClient, watch: Watch, begin: Callable[[], Awaitable[None]]) -> float:
+    await begin()
+    watch.clear()
+    started_s = time.monotonic()
+    answer = asyncio.create_task(client.post("/api/live/stop", json={}))
+    took_s = await watch.last(MARGIN_S) - started_s
+    (await answer).raise_for_status()
+    return took_s
+
+
+class _Busy:
+    """What a page has the server do meanwhile."""
+
+    def __init__(self, client: httpx.AsyncClient) -> None:
+        self._client = client
+        self._job: str | None = None
+        self._saves: dict[str, asyncio.Task[httpx.Response]] = {}
+
+    async def nothing(self) -> None:
+        """No more than it does by itself."""
+        await asyncio.sleep(_LOOK_S)
+
+    async def backup(self) -> None:
+        """A backup runs: another one where the last has ended."""
+        state = None
+        if self._job is not None:
+            state = (await self._client.get(f"/api/live/jobs/{self._job}")).json()["state"]
+        if state != "running":
+            answer = await self._client.post("/api/live/backup", json={"reason": "bench"})
+            self._job = answer.json()["id"]
+        await asyncio.sleep(_LOOK_S)
+
+    async def saves(self) -> None:
+        """A save of 10 s runs at every axis: another one where STOP has ended the last."""
+        for slug in SLUGS:
+            if slug not in self._saves or self._saves[slug].done():
+                self._saves[slug] = asyncio.create_task(self._client.post(f"/api/live/devices/{slug}/save", json={}))
+        await asyncio.sleep(2 * _LOOK_S)
+
+    async def end(self) -> None:
+        """Wait for nothing that still runs: the next STOP ends it."""
+        for save in self._saves.values():
+            save.cancel()
+        await asyncio.gather(*self._saves.values(), return_exceptions=True)
+
+
+# -- the peer ---------------------------------------------------------------------------------
+
+
+async def _peer(address: str, presses: int) -> Run:
+    """The same command as an ordinary write, behind a save that runs."""
+    times_s = []
+    async with _watching(address) as watch:
+        driver = _driver(address)
+        await driver.connect()
+        try:
+            for _ in range(presses):
+                saves = [asyncio.create_task(driver.write(node, _SAVE, b"save", verify=Verify.ACK)) for node in AXES]
+                await asyncio.sleep(2 * _LOOK_S)
+                watch.clear()
+                started_s = time.monotonic()
+                stops = [driver.write(node, CONTROLWORD, QUICK_STOP, verify=Verify.ACK) for node in AXES]
+                done = asyncio.gather(*stops, return_exceptions=True)
+                times_s.append(await watch.last(3 * MARGIN_S) - started_s)
+                await done
+                for save in saves:
+                    with suppress(HubsideError):
+                        await save
+        finally:
+            await driver.close()
+    return Run("as an ordinary write behind a save of 10 s", times_s)

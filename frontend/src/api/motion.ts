@@ -1,0 +1,51 @@
+/** The desk from which axes are moved. Who has the lease and what is under way comes over the socket. */
+import { queryOptions } from "@tanstack/react-query";
+import { get, send } from "./client";
+import type { components } from "./generated";
+import type { MotionData } from "./types";
+
+type Schemas = components["schemas"];
+
+export type Lease = Schemas["LeaseDoc"];
+export type Interlock = Schemas["InterlockDoc"];
+export type Moved = Schemas["MovedDoc"];
+export type Prepared = Schemas["PreparedDoc"];
+
+/** Every order bears the number of the lease, and one of its own that rises. */
+export interface Order {
+  fence: number;
+  order: number;
+}
+
+const ROOT = "/api/live/motion";
+const axis = (slug: string) => `/api/live/devices/${slug}/motion`;
+const LOOK_MS = 1000;
+
+/** What holds an axis back changes by itself: it is looked at as long as it is shown. */
+export const interlocksQuery = (slug: string) =>
+  queryOptions({
+    queryKey: ["interlocks", slug],
+    queryFn: ({ signal }) => get<Interlock[]>(`${axis(slug)}/interlocks`, signal),
+    refetchInterval: LOOK_MS,
+    staleTime: 0,
+  });
+
+export const moving = {
+  take: (page: string) => send<Lease>("POST", `${ROOT}/lease`, { page }),
+  ask: (page: string) => send<Lease>("POST", `${ROOT}/lease/ask`, { page }),
+  withdraw: (page: string) => send<MotionData>("POST", `${ROOT}/lease/withdraw`, { page }),
+  answer: (fence: number, handOver: boolean) =>
+    send<MotionData>("POST", `${ROOT}/lease/answer`, { fence, hand_over: handOver }),
+  giveBack: (fence: number) => send<MotionData>("POST", `${ROOT}/lease/give-back`, { fence }),
+  confirm: (fence: number, rotorLocked: boolean, peopleOut: boolean) =>
+    send<MotionData>("POST", `${ROOT}/confirm`, { fence, rotor_locked: rotorLocked, people_out: peopleOut }),
+  prepare: (slug: string, order: Order) => send<Prepared>("POST", `${axis(slug)}/prepare`, order),
+  putBack: (slug: string, order: Order) => send<MotionData>("POST", `${axis(slug)}/put-back`, order),
+  jog: (slug: string, order: Order, speedDps: number) =>
+    send<Moved>("POST", `${axis(slug)}/jog`, { ...order, speed_dps: speedDps }),
+  move: (slug: string, order: Order, angleDeg: number, speedDps: number) =>
+    send<Moved>("POST", `${axis(slug)}/move`, { ...order, angle_deg: angleDeg, speed_dps: speedDps }),
+  home: (slug: string, order: Order, angleDeg: number) =>
+    send<Moved>("POST", `${axis(slug)}/home`, { ...order, angle_deg: angleDeg }),
+  reset: (slug: string, order: Order) => send<Moved>("POST", `${axis(slug)}/reset`, order),
+};

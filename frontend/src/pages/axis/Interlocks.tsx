@@ -1,0 +1,24 @@
+import { IconCircleCheck, IconLock } from "@tabler/icons-react";
+import { useQuery } from "@tanstack/react-query";
+import { interlocksQuery } from "../../api/motion";
+import motion from "../../motion/Motion.module.css";
+import { useTexts } from "../../texts/texts";
+
+/** What holds the axis back, each with its reason, before it bites. */
+export function Interlocks({ device }: { device: string }) {
+  const t = useTexts();
+  const { data } = useQuery(interlocksQuery(device));
+  return (
+    <section aria-label={t("page.motion.interlocks")}>
+      <h3>{t("page.motion.interlocks")}</h3>
+      <ul className={motion.locks} data-testid="interlocks">
+        {(data ?? []).map(({ name, holds_back: bites, details }) => (
+          <li key={name} data-bites={bites} data-testid={`interlock-${name}`}>
+            {bites ? <IconLock size={17} aria-hidden /> : <IconCircleCheck size={17} aria-hidden />}
+            <span>{t(`interlock.${name}.${bites ? "bites" : "clear"}`, details)}</span>
+          </li>
+        ))}
+      </ul>
+    </section>
+  );
+}

@@ -1,0 +1,123 @@
+import { Button, NumberInput } from "@mantine/core";
+import { useState } from "react";
+import { moving, type Order } from "../../api/motion";
+import { useAxes } from "../../live/live";
+import { Control, useControl } from "../../motion/lease";
+import motion from "../../motion/Motion.module.css";
+import { OrderProblem } from "../../motion/OrderProblem";
+import { RunButton } from "../../motion/RunButton";
+import { travel } from "../../motion/travel";
+import { useOrder } from "../../motion/useOrder";
+import { figure } from "../../model/values";
+import { useTexts } from "../../texts/texts";
+import { typedNumber } from "../../ui/typedNumber";
+
+/** The fastest by hand; the server refuses more. */
+const MOST_DPS = 5;
+const USUAL_DPS = 2;
+
+enum Way {
+  Minus = "minus",
+  Plus = "plus",
+  To = "to",
+}
+
+/** Hold to run: jog to either side, or move to an angle; and the reset of a fault. */
+export function MoveSection({ device }: { device: string }) {
+  const t = useTexts();
+  const { motion: line, state } = useControl();
+  const order = useOrder();
+  const [speed, setSpeed] = useState(USUAL_DPS);
+  const [angle, setAngle] = useState(85);
+  const axis = [...useAxes().values()].find((one) => device.startsWith(one.station));
+  const ready = state === Control.Own && line?.prepared.some((one) => one.device === device) === true;
+  const busy = order.isPending || line?.running != null;
+  const doing = line?.running?.device === device ? line.running.doing : null;
+  const [pressed, setPressed] = useState<Way | null>(null);
+  const hold = (way: Way, work: (one: Order) => Promise<unknown>) => {
+    setPressed(way);
+    order.mutate({ held: true, work });
+  };
+  const active = (way: Way) => doing !== null && pressed === way;
+  const trip = axis?.position_deg == null ? null : travel(angle - axis.position_deg, speed);
+  return (
+    <section aria-label={t("page.motion.move")}>
+      <h3>{t("page.motion.move")}</h3>
+      <div className={motion.row}>
+        <NumberInput
+          label={t("page.motion.speed")}
+          value={speed}
+          onChange={(value) => typedNumber(value, setSpeed)}
+          min={0.1}
+          max={MOST_DPS}
+          allowNegative={false}
+          clampBehavior="strict"
+          step={0.5}
+          decimalScale={2}
+          suffix=" °/s"
+          w={130}
+          data-testid="speed"
+        />
+        <NumberInput
+          label={t("page.motion.angle")}
+          value={angle}
+          onChange={(value) => typedNumber(value, setAngle)}
+          step={1}
+          decimalScale={2}
+          suffix="°"
+          w={130}
+          data-testid="angle"
+        />
+      </div>
+      <div className={motion.row}>
+        <RunButton
+          hint={t("page.motion.to_zero")}
+          disabled={!ready || busy}
+          active={active(Way.Minus)}
+          onPress={() => hold(Way.Minus, (one) => moving.jog(device, one, -Math.abs(speed)))}
+          testId="jog-minus"
+        >
+          ◀ {t("page.motion.jog")}
+        </RunButton>
+        <RunButton
+          hint={t("page.motion.to_feather")}
+          disabled={!ready || busy}
+          active={active(Way.Plus)}
+          onPress={() => hold(Way.Plus, (one) => moving.jog(device, one, Math.abs(speed)))}
+          testId="jog-plus"
+        >
+          {t("page.motion.jog")} ▶
+        </RunButton>
+        <RunButton
+          hint={
+            trip === null
+              ? t("page.motion.hold")
+              : t("page.motion.trip", { seconds: figure(trip, 1, t.language) })
+          }
+          disabled={!ready || busy}
+          active={active(Way.To)}
+          onPress={() => hold(Way.To, (one) => moving.move(device, one, angle, speed))}
+          testId="move-to"
+        >
+          {t("page.motion.move_to", { angle: figure(angle, 2, t.language) })}
+        </RunButton>
+      </div>
+      <div className={motion.row}>
+        <Button
+          variant="default"
+          disabled={!ready || busy}
+          onClick={() => order.mutate({ held: false, work: (one) => moving.reset(device, one) })}
+          data-testid="reset-fault"
+        >
+          {t("page.motion.reset")}
+        </Button>
+        <span className={motion.ended} data-testid="motion-ended">
+          {line?.ended?.device === device &&
+            doing === null &&
+            `${t(`motion.doing.${line.ended.doing}`)}: ${t(`motion.ended.${line.ended.why}`)}`}
+        </span>
+      </div>
+      <OrderProblem error={order.error} title={t("page.motion.order_failed")} />
+    </section>
+  );
+}

@@ -1,0 +1,199 @@
+"""A blade is moved from the page as its user would: control, confirmations, proof, hold to run; else it stops."""
+
+from __future__ import annotations
+
+import contextlib
+import re
+import time
+
+import pytest
+from playwright.sync_api import BrowserContext, Error, Page, expect
+
+from tests.e2e.browser import SIZE
+from tests.e2e.test_page_quality import AXE
+
+pytestmark = [pytest.mark.browser, pytest.mark.timeout(300)]
+MOVE_MS = 30_000
+HELD_BACK = ("rotor_locked", "people_out")
+
+
+def axis_page(context: BrowserContext, demo: str, blade: int, search: str = "") -> Page:
+    page = context.new_page()
+    page.goto(f"{demo.split('?')[0]}axis?blade={blade}&scene=off{search}")
+    expect(page.get_by_test_id("motion")).to_be_visible()
+    expect(page.get_by_test_id("axis-angle")).to_have_text(re.compile(r"\d"))
+    return page
+
+
+def angle(page: Page) -> float:
+    return float(page.get_by_test_id("axis-angle").inner_text().rstrip("°"))
+
+
+def press(page: Page, test_id: str) -> None:
+    """Press with the pointer and keep it down."""
+    button = page.get_by_test_id(test_id)
+    expect(button).to_have_attribute("aria-disabled", "false")
+    button.hover()
+    page.mouse.down()
+
+
+def take_control(page: Page) -> None:
+    page.get_by_test_id("take-control").click()
+    expect(page.get_by_test_id("control")).to_contain_text("You")
+    for name in ("rotor-locked", "people-out"):
+        page.get_by_test_id(name).check()
+    for name in HELD_BACK:
+        expect(page.get_by_test_id(f"interlock-{name}")).to_have_attribute("data-bites", "false")
+
+
+def prepare(page: Page) -> None:
+    press(page, "prepare")
+    expect(page.get_by_test_id("proof")).to_contain_text("Proven", timeout=MOVE_MS)
+    page.mouse.up()
+
+
+def give_back(page: Page) -> None:
+    page.get_by_test_id("give-back").click()
+    expect(page.get_by_test_id("control")).to_have_count(0)
+
+
+def stands_still(page: Page) -> float:
+    """Where the blade stands, once it does."""
+    before = angle(page)
+    deadline = time.monotonic() + MOVE_MS / 1000
+    while time.monotonic() < deadline:
+        page.wait_for_timeout(400)
+        now = angle(page)
+        if now == before:
+            return now
+        before = now
+    raise AssertionError("the blade goes on")
+
+
+def test_a_blade_is_moved_as_long_as_the_button_is_held(context: BrowserContext, demo: str) -> None:
+    page = axis_page(context, demo, 1)
+    for name in HELD_BACK:
+        expect(page.get_by_test_id(f"interlock-{name}")).to_have_attribute("data-bites", "true")
+    expect(page.get_by_test_id("jog-minus")).to_have_attribute("aria-disabled", "true")
+    take_control(page)
+    prepare(page)
+    start = stands_still(page)
+
+    press(page, "jog-minus")
+    page.wait_for_function(
+        "from => parseFloat(document.querySelector('[data-testid=axis-angle]').textContent) < from - 2", arg=start
+    )
+    page.mouse.up()
+    expect(page.get_by_test_id("motion-ended")).to_contain_text("Jog: let go", timeout=MOVE_MS)
+    rest = stands_still(page)
+    assert start - 8 < rest < start - 2
+    expect(page.get_by_test_id("state-diagram")).to_have_attribute(
+        "data-state", re.compile("ready_to_switch_on|switch_on_disabled")
+    )
+
+    page.get_by_test_id("angle").fill("80")
+    page.get_by_test_id("speed").fill("5")
+    page.get_by_test_id("move-to").focus()
+    page.keyboard.down("Enter")
+    expect(page.get_by_test_id("motion-ended")).to_contain_text("Move: done", timeout=MOVE_MS)
+    page.keyboard.up("Enter")
+    assert abs(stands_still(page) - 80) < 0.3
+
+    page.get_by_test_id("put-back").click()
+    expect(page.get_by_test_id("prepare")).to_be_visible()
+    give_back(page)
+    page.close()
+
+
+def test_a_tab_that_is_killed_stops_its_blade(context: BrowserContext, demo: str) -> None:
+    page, other = axis_page(context, demo, 2), axis_page(context, demo, 2)
+    take_control(page)
+    expect(other.get_by_test_id("take-control")).to_have_text("Ask for control")
+    prepare(page)
+    start = stands_still(other)
+    press(page, "jog-minus")
+    other.wait_for_function(
+        "from => parseFloat(document.querySelector('[data-testid=axis-angle]').textContent) < from - 1", arg=start
+    )
+    with contextlib.suppress(Error):
+        page.goto("chrome://crash")
+    expect(other.get_by_test_id("motion-ended")).to_contain_text("quick stop, the page was silent", timeout=MOVE_MS)
+    rest = stands_still(other)
+    assert rest > start - 8
+    page.close()
+    expect(other.get_by_test_id("control")).to_have_count(0, timeout=MOVE_MS)
+    expect(other.get_by_test_id("take-control")).to_have_text("Take control")
+    other.close()
+
+
+def home_at(page: Page, angle_deg: str) -> None:
+    """Type the angle and hold the button long enough."""
+    page.get_by_test_id("home-angle").fill(angle_deg)
+    button = page.get_by_test_id("home")
+    expect(button).to_be_enabled()
+    button.hover()
+    page.mouse.down()
+    done = page.get_by_test_id("axis-angle").get_by_text(f"{float(angle_deg):.2f}°")
+    expect(done.or_(page.get_by_test_id("problem"))).to_be_visible(timeout=MOVE_MS)
+    page.mouse.up()
+    assert page.get_by_test_id("problem").all_inner_texts() == []
+
+
+def test_the_present_position_is_called_an_angle(context: BrowserContext, demo: str) -> None:
+    page = axis_page(context, demo, 3)
+    expect(page.get_by_test_id("home")).to_be_disabled()
+    take_control(page)
+    prepare(page)
+    before = stands_still(page)
+    home_at(page, "45")
+    expect(page.get_by_test_id("motion-ended")).to_contain_text("Homing: done")
+    home_at(page, f"{before:.2f}")
+    give_back(page)
+    page.close()
+
+
+def test_control_is_asked_for_and_handed_over(context: BrowserContext, demo: str) -> None:
+    first, second = axis_page(context, demo, 3), axis_page(context, demo, 3)
+    first.get_by_test_id("take-control").click()
+    expect(first.get_by_test_id("control")).to_contain_text("You")
+    second.get_by_test_id("take-control").click()
+    expect(first.get_by_test_id("asked")).to_contain_text("asks for control")
+    first.get_by_role("button", name="Keep it").click()
+    expect(second.get_by_text("keeps control for now")).to_be_visible()
+    second.get_by_test_id("take-control").click()
+    first.get_by_role("button", name="Hand over").click()
+    expect(second.get_by_test_id("control")).to_contain_text("You")
+    expect(first.get_by_test_id("take-control")).to_have_text("Ask for control")
+    give_back(second)
+    expect(first.get_by_test_id("take-control")).to_have_text("Take control")
+    first.close()
+    second.close()
+
+
+@pytest.mark.parametrize("theme", ["dark", "light"])
+@pytest.mark.parametrize("language", ["en", "de"])
+def test_axe_finds_nothing_serious_and_nothing_is_cut(
+    context: BrowserContext, demo: str, theme: str, language: str
+) -> None:
+    page = axis_page(context, demo, 1, f"&theme={theme}&lang={language}")
+    page.set_viewport_size(SIZE)
+    page.get_by_test_id("take-control").click()
+    expect(page.get_by_test_id("control")).to_be_visible()
+    stop = page.get_by_test_id("stop").bounding_box()
+    assert stop is not None
+    assert stop["x"] + stop["width"] <= SIZE["width"]
+    page.add_script_tag(path=AXE)
+    result = page.evaluate("() => axe.run(document, {resultTypes: ['violations']})")
+    assert result["passes"], "axe has looked at something"
+    found = [
+        f"{one['impact']} {one['id']}: {node['html'][:160]}"
+        for one in result["violations"]
+        if one["impact"] in ("serious", "critical")
+        for node in one["nodes"]
+    ]
+    assert found == []
+    wide = page.evaluate("() => document.documentElement.scrollWidth")
+    assert wide <= SIZE["width"]
+    page.get_by_test_id("give-back").click()
+    expect(page.get_by_test_id("control")).to_have_count(0)
+    page.close()
