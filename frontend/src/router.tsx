@@ -24,7 +24,7 @@ const parametersRoute = createRoute({
 const axisRoute = createRoute({
   getParentRoute: () => rootRoute,
   path: "/axis",
-  component: lazyRouteComponent(() => import("./pages/axis/AxisPage"), "AxisPage"),
+  component: lazyRouteComponent(() => import("./pages/axis/AxisRoom"), "AxisRoom"),
 });
 
 const setsRoute = createRoute({

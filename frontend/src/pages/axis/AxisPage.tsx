@@ -1,18 +1,13 @@
-import { SegmentedControl } from "@mantine/core";
-import { useQuery } from "@tanstack/react-query";
-import { useTurbineQuery } from "../../api/queries";
 import type { AxisData, StationRef } from "../../api/types";
 import { usePageSearch } from "../../frame/search";
-import { Unconnected } from "../../frame/Unconnected";
 import { useAxes, useServerNow, useWatchDevice } from "../../live/live";
 import { figure } from "../../model/values";
 import { useTexts } from "../../texts/texts";
 import { useDeviceContext } from "../../ui/reading";
-import { stationName } from "../../ui/devices";
 import { age } from "../../ui/format";
-import room from "../../ui/Room.module.css";
 import { PMC, PMM } from "../overview/layout";
 import classes from "./Axis.module.css";
+import { BladeStrip } from "./BladeStrip";
 import { BitPanel } from "./BitPanel";
 import { ErrorHistory } from "./ErrorHistory";
 import { Measurements } from "./Measurements";
@@ -22,28 +17,11 @@ import { StateDiagram } from "./StateDiagram";
 
 /** One axis in full: its state machine, what it measures, its inputs and outputs, and what moves it. */
 export function AxisPage() {
-  const t = useTexts();
-  const query = useQuery(useTurbineQuery());
-  const turbine = query.data;
-  const [search, update] = usePageSearch();
-  const stations = (turbine?.stations ?? []).filter((station) => station.blade !== null);
-  const station = stations.find((one) => String(one.blade) === search.blade) ?? stations[0];
-  if (!turbine) return query.isSuccess ? <Unconnected /> : null;
-  if (!station) return <p className={room.note}>{t("page.axis.none")}</p>;
   return (
     <div className={classes.page}>
-      <div className={room.strip}>
-        <h1>{t("page.rooms.axis")}</h1>
-        <SegmentedControl
-          value={String(station.blade)}
-          onChange={(blade) => update({ blade })}
-          data={stations.map((one) => ({ value: String(one.blade), label: stationName(one, t) }))}
-          aria-label={t("page.axis.choose")}
-          data-testid="choose-blade"
-        />
-        <Now station={station} />
-      </div>
-      <Blade key={station.slug} station={station} />
+      <BladeStrip now={(station) => <Now station={station} />}>
+        {(station) => <Blade key={station.slug} station={station} />}
+      </BladeStrip>
     </div>
   );
 }

@@ -1,0 +1,25 @@
+import { lazy } from "react";
+import { useTexts } from "../../texts/texts";
+import { TabbedRoom } from "../../ui/TabbedRoom";
+
+/** Each comes when it is looked at. */
+const TABS = {
+  move: lazy(async () => ({ default: (await import("./AxisPage")).AxisPage })),
+};
+
+/** What belongs to one tab. */
+const OWN = ["span"] as const;
+
+/** One axis: what it does and what moves it, what sets it up, and what measures it. */
+export function AxisRoom() {
+  const t = useTexts();
+  return (
+    <TabbedRoom
+      name="axis"
+      label={t("page.axis.tab.label")}
+      titleOf={(tab) => t(`page.axis.tab.${tab}`)}
+      tabs={TABS}
+      own={OWN}
+    />
+  );
+}
