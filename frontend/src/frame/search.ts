@@ -40,6 +40,8 @@ export interface PageSearch {
   blade?: string;
   /** Seconds that its plots span. */
   span?: string;
+  /** The picture of the setting up that is open. */
+  picture?: string;
   /** Name of the recording or set that is open. */
   file?: string;
   /** Filter, order (column, minus sign where descending) and hidden columns of the tables of files, sets and the bus. */
@@ -117,6 +119,7 @@ const TEXTS = [
   "blade",
   "camera",
   "span",
+  "picture",
   "file",
   "find",
   "order",

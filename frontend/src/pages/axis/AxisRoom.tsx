@@ -5,10 +5,11 @@ import { TabbedRoom } from "../../ui/TabbedRoom";
 /** Each comes when it is looked at. */
 const TABS = {
   move: lazy(async () => ({ default: (await import("./AxisPage")).AxisPage })),
+  setup: lazy(async () => ({ default: (await import("./setup/SetupTab")).SetupTab })),
 };
 
 /** What belongs to one tab. */
-const OWN = ["span"] as const;
+const OWN = ["span", "picture"] as const;
 
 /** One axis: what it does and what moves it, what sets it up, and what measures it. */
 export function AxisRoom() {

@@ -1,0 +1,64 @@
+import { SegmentedControl } from "@mantine/core";
+import { type ComponentType, Suspense } from "react";
+import type { StationRef } from "../../../api/types";
+import { usePageSearch } from "../../../frame/search";
+import { useWatchDevice } from "../../../live/live";
+import type { DeviceContext } from "../../../model/shown";
+import { useTexts } from "../../../texts/texts";
+import { useDeviceContext } from "../../../ui/reading";
+import classes from "../Axis.module.css";
+import { BladeStrip } from "../BladeStrip";
+import { PMC, PMM } from "../../overview/layout";
+
+/** What a picture is drawn of: the two units of a blade, as far as the station has them. */
+export interface PictureProps {
+  station: StationRef;
+  pmm: DeviceContext | null;
+  pmc: DeviceContext | null;
+}
+
+/** Each comes when it is looked at; the first one needs no mention in the address. */
+const PICTURES: Readonly<Record<string, ComponentType<PictureProps>>> = {};
+
+/** The pictures that set up an axis; what is changed in one is staged, and written from the review of all changes. */
+export function SetupTab() {
+  return (
+    <div className={classes.page}>
+      <BladeStrip now={() => <Choice />}>
+        {(station) => <Picture key={station.slug} station={station} />}
+      </BladeStrip>
+    </div>
+  );
+}
+
+const names = Object.keys(PICTURES);
+
+function useChosen(): string | undefined {
+  const [{ picture }] = usePageSearch();
+  return names.find((one) => one === picture) ?? names[0];
+}
+
+function Choice() {
+  const t = useTexts();
+  const [, update] = usePageSearch();
+  return (
+    <SegmentedControl
+      value={useChosen() ?? ""}
+      onChange={(chosen) => update({ picture: chosen === names[0] ? undefined : chosen })}
+      data={names.map((one) => ({ value: one, label: t(`page.setup.picture.${one}`) }))}
+      aria-label={t("page.setup.choose")}
+      data-testid="choose-picture"
+    />
+  );
+}
+
+function Picture({ station }: { station: StationRef }) {
+  const pmm = station.devices.find((device) => device.description_id === PMM);
+  const pmc = station.devices.find((device) => device.description_id === PMC);
+  useWatchDevice(pmm?.slug ?? null);
+  useWatchDevice(pmc?.slug ?? null);
+  const contexts = { pmm: useDeviceContext(pmm), pmc: useDeviceContext(pmc) };
+  const chosen = useChosen();
+  const Shown = chosen === undefined ? undefined : PICTURES[chosen];
+  return <Suspense>{Shown && <Shown station={station} {...contexts} />}</Suspense>;
+}
