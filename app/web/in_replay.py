@@ -23,6 +23,7 @@ ALSO_IN_REPLAY: Final[tuple[tuple[str, str], ...]] = (
     # what stops, and what only ends something
     ("POST", "/api/live/stop"),
     ("POST", "/api/live/feather"),
+    ("POST", "/api/live/devices/{turbine}/{station}/{device}/stop"),
     ("POST", "/api/live/disconnect"),
     ("POST", "/api/live/motion/lease/withdraw"),
     ("POST", "/api/live/motion/lease/answer"),

@@ -44,7 +44,7 @@ class Contexts(Protocol):
 class DeadManDesk(Protocol):
     """Where the beats of pages go that hold an axis."""
 
-    def beat(self, page: str, fence: int, number: int, holding: bool, order: int) -> None:
+    def beat(self, page: str, fence: int, number: int, holding: bool, order: int, sent_s: float | None) -> None:
         """A beat has come."""
 
     def page_gone(self, page: str) -> None:
@@ -79,7 +79,8 @@ class Client:
         if isinstance(request, Beat):
             self._page = request.page
             if (desk := self._desk()) is not None:
-                desk.beat(request.page, request.fence, request.number, request.holding, request.order)
+                sent_s = request.sent_ms / 1000
+                desk.beat(request.page, request.fence, request.number, request.holding, request.order, sent_s)
             return
         feed = self._live if request.ctx == LIVE else self._other(request.ctx, bool(request.topics))
         if feed is not None:

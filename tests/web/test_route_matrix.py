@@ -67,6 +67,10 @@ ROUTES: Final[dict[tuple[str, str], Role]] = {
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/move"): TECHNICIAN,
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/home"): TECHNICIAN,
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/reset"): TECHNICIAN,
+    ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/hold"): TECHNICIAN,
+    ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/feather"): TECHNICIAN,
+    ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/brake-test"): TECHNICIAN,
+    ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/halt"): TECHNICIAN,
     ("GET", "/api/live/descriptions/{description_id}"): VIEWER,
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/read"): TECHNICIAN,
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/write"): TECHNICIAN,
@@ -78,6 +82,7 @@ ROUTES: Final[dict[tuple[str, str], Role]] = {
     ("DELETE", "/api/live/jobs/{job_id}"): TECHNICIAN,
     ("POST", "/api/live/stop"): VIEWER,
     ("POST", "/api/live/feather"): VIEWER,
+    ("POST", "/api/live/devices/{turbine}/{station}/{device}/stop"): VIEWER,
     # the bus
     ("GET", "/api/live/frames"): VIEWER,
     ("GET", "/api/live/bus/nodes"): VIEWER,

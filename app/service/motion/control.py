@@ -100,6 +100,13 @@ class Control:
         if not sent:
             raise AxisStateError(device=self.target.slug, state="not operational", wanted="operational")
 
+    async def halt(self) -> None:
+        """Halt an axis that is enabled; any other one would be enabled by that word. Raises AxisStateError too."""
+        state = await self.state()
+        if state is not AxisState.OPERATION_ENABLED:
+            raise AxisStateError(device=self.target.slug, state=state.name.lower(), wanted="operation_enabled")
+        self.word(Word.HALT)
+
     def stop(self) -> bool:
         """Quick stop at once. False where it could not be sent as a PDO and has to be written.
 
@@ -176,6 +183,14 @@ class Control:
                 return False
             await asyncio.sleep(_LOOK_S)
 
+    async def require_at_rest(self) -> None:
+        """Raises AxisStateError where the axis has power or does not stand."""
+        state = await self.state()
+        if state not in _OFF:
+            raise AxisStateError(device=self.target.slug, state=state.name.lower(), wanted="ready_to_switch_on")
+        if not await self.until_still(timeout_s=0.0):
+            raise AxisStateError(device=self.target.slug, state="moving", wanted="standstill")
+
     # -- sequences -------------------------------------------------------------------
 
     async def until_off(self, timeout_s: float) -> bool:
@@ -227,18 +242,25 @@ class Control:
     async def reset_fault(self) -> AxisState:
         """Reset the fault; the state that came of it, which is the fault where its cause still stands.
 
-        By an edge of bit 7, or where an open safety chain keeps the axis from listening to its controlword by one of
-        5040h (manual 5.15, table 8). Raises OvertakenError, AxisStateError, and what a write raises.
+        By an edge of bit 7, or by one of 5040h (manual 5.15, table 8) where an open safety chain keeps the axis from
+        listening to its controlword, or where it hears no PDO. Raises OvertakenError, AxisStateError, and what a write
+        raises.
         """
-        if await self.status() & REMOTE:
-            self.word(Word.SHUTDOWN)
-            self.word(Word.FAULT_RESET)
-            self.word(Word.SHUTDOWN)
-        else:
+        if not await self.status() & REMOTE or not self._reset_by_word():
             self.require_own()
             for data in (b"\x80", b"\0"):
                 await self.driver.write(self.target.node, MANUAL, data, verify=Verify.ACK)
         return await self._reset_done()
+
+    def _reset_by_word(self) -> bool:
+        """The edge of bit 7 as a PDO; False where the node is not operational, and nothing was sent."""
+        try:
+            self.word(Word.SHUTDOWN)
+        except AxisStateError:
+            return False
+        self.word(Word.FAULT_RESET)
+        self.word(Word.SHUTDOWN)
+        return True
 
     async def _reset_done(self) -> AxisState:
         """Wait until the axis listens again and has no fault, or until it is clear that it will not."""

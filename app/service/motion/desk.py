@@ -58,6 +58,9 @@ class Doing(Enum):
     MOVE = "move"
     HOMING = "homing"
     RESET = "reset"
+    HOLD = "hold"
+    FEATHER = "feather"
+    BRAKE_TEST = "brake_test"
 
 
 class Ended(Enum):
@@ -81,7 +84,8 @@ _STOPPED: Final = (Ended.SILENT, Ended.LEASE, Ended.LINK)
 class Running:
     """A motion under way.
 
-    ``held``: it goes on only while its person holds it; ``turning``: the axis was told to run.
+    ``held``: it goes on only while its person holds it; ``turning``: the axis was told to run; ``let_go``: the word by
+    which it stops when its person lets go.
     """
 
     slug: str
@@ -90,6 +94,7 @@ class Running:
     held: bool
     order: int = 0
     turning: bool = False
+    let_go: Word = Word.HALT
     why: Ended | None = None
     task: asyncio.Task[None] | None = None
     over: asyncio.Event = field(default_factory=asyncio.Event)
@@ -209,10 +214,14 @@ class MotionDesk:
         if holder is not None and holder.page == page and running is not None and running.held:
             self._stop_running(running, Ended.SILENT)
 
-    def beat(self, page: str, fence: int, number: int, holding: bool, order: int = 0) -> None:
-        """A beat of the dead man came from a page; who lets go is heard at once."""
+    def beat(
+        self, page: str, fence: int, number: int, holding: bool, order: int = 0, sent_s: float | None = None
+    ) -> None:
+        """A beat of the dead man came from a page; who lets go is heard at once. ``sent_s``: by the page's clock."""
         holder = self.lease.holder
-        if holder is None or holder.page != page or not self.dead_man.beat(fence, number, holding, order):
+        if holder is None or holder.page != page:
+            return
+        if not self.dead_man.beat(fence, number, holding, order, sent_s):
             return
         self.lease.heard(page)
         running = self.running
@@ -230,7 +239,7 @@ class MotionDesk:
             running.end(Ended.RELEASED)
             return
         try:
-            running.control.word(Word.HALT)
+            running.control.word(running.let_go)
             running.end(Ended.RELEASED)
         except OvertakenError:  # STOP or FEATHER has it now
             running.end(Ended.STOPPED)
@@ -377,8 +386,6 @@ class MotionDesk:
             axis = Prepared(control)
             try:
                 async with self._changing:  # the settings of an earlier lease may just be put back
-                    if known is not None:
-                        axis.started, axis.nmt_before = known.started, known.nmt_before
                     self.prepared[slug] = axis  # another one: who puts the earlier one back finds it gone
                     await preparation.set_up(axis, heartbeat, self.left, journal)
                 await preparation.prove(axis, heartbeat, lambda: not running.over.is_set())
@@ -408,6 +415,10 @@ class MotionDesk:
                 await self._put_back(axis, journal)
             else:
                 await preparation.put_back(control, self.left, journal)
+                if interlocks.others_at_work(self.connection, control.target):
+                    await self.left.forget_nmt(slug)  # who started the node since then needs it so
+                else:
+                    await preparation.give_nmt_back(control, self.left, journal)
         finally:
             if self.running is running:
                 self.running = None
@@ -419,7 +430,8 @@ class MotionDesk:
             if self.prepared.get(axis.slug) is not axis:
                 return
             await preparation.put_back(axis.control, self.left, journal)
-            preparation.leave(axis, heartbeat, journal)
+            heartbeat.forget(axis.slug)
+            await preparation.give_nmt_back(axis.control, self.left, journal)
             self.prepared.pop(axis.slug, None)
         journal.note(Kind.MOTION_PUT_BACK, axis.slug)
 
@@ -434,6 +446,28 @@ class MotionDesk:
                 log.warning("%s: what was prepared is not put back: %s", axis.slug, error.code)
 
     # -- motion ---------------------------------------------------------------------------------
+
+    async def halt(self, slug: str, fence: int) -> None:
+        """Halt one axis by its ramp, whoever has it run; what is under way there ends.
+
+        Raises LeaseError and its like, AxisStateError where it is not enabled, and what reading raises.
+        """
+        self.lease.check(fence)
+        running = self.running
+        if running is not None and running.slug == slug and running.held:
+            self._halt_running(running)
+            return
+        control = self._control(self._axis(slug))
+        control.own()
+        await control.halt()
+
+    async def without_proof(
+        self, slug: str, fence: int, doing: Doing, work: Callable[[Running], Awaitable[None]]
+    ) -> None:
+        """Let ``work`` command an axis that need not be prepared: nothing moves by it. Raises what ``_run`` raises."""
+        axis = self.prepared.get(slug)
+        control = self._control(self._axis(slug)) if axis is None else axis.control
+        await self._run(slug, fence, doing, control, work, held=False)
 
     async def move(
         self, slug: str, fence: int, doing: Doing, work: Callable[[Running], Awaitable[None]], held: bool = True

@@ -85,8 +85,17 @@ async def look(
     ]
 
 
+def others_at_work(connection: Connection, target: Target) -> bool:
+    """Another master was heard on the bus of ``target`` in the last seconds."""
+    return bool(_heard(connection.buses[target.device.bus], connection.stamper()))
+
+
+def _heard(link: BusLink, now_ns: int) -> list[str]:
+    return [one.sign.value for one in link.status.masters if now_ns - one.t_ns < MASTER_QUIET_NS]
+
+
 def _masters(link: BusLink, now_ns: int) -> Standing:
-    seen = [one.sign.value for one in link.status.masters if now_ns - one.t_ns < MASTER_QUIET_NS]
+    seen = _heard(link, now_ns)
     return Standing(
         Interlock.NO_MASTER, bool(seen) or link.needs_consent, {"seen": ", ".join(dict.fromkeys(seen)) or "–"}
     )

@@ -1,15 +1,17 @@
-"""Settings that were changed for motion and are not put back yet: kept, so that they can be after a server was killed.
+"""What was changed for motion and is not put back yet: kept, so that it can be after a server was killed.
 
-They stand in RAM alone: a restart of the device ends them too.
+Settings stand in RAM alone: a restart of the device ends them too, and its NMT state with them.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from typing import Any, Final, NamedTuple
 
 from app.model.address import Address, parse_address
 from app.store.small_rows import get_setting, put_setting
 from app.store.store import Store
+from app.wire.nmt import NmtState
 
 KEY: Final = "motion.left"
 
@@ -19,6 +21,12 @@ class Changed(NamedTuple):
 
     was: bytes
     now: bytes
+
+
+@dataclass
+class _Found:
+    objects: dict[Address, Changed] = field(default_factory=dict)
+    nmt: NmtState | None = None
 
 
 class Left:
@@ -36,42 +44,65 @@ class Left:
 
     def of(self, device: str) -> dict[Address, Changed]:
         """What was changed there, in the order in which it was."""
-        return dict(self._found.get(device, {}))
+        found = self._found.get(device)
+        return {} if found is None else dict(found.objects)
+
+    def nmt_of(self, device: str) -> NmtState | None:
+        """The NMT state that the node had before it was started for motion; None where it was not."""
+        found = self._found.get(device)
+        return None if found is None else found.nmt
 
     async def note(self, device: str, address: Address, changed: Changed) -> None:
         """It is about to be written; kept before that. What it held first counts. Raises StoreError."""
-        held = self._found.get(device, {}).get(address)
-        self._found.setdefault(device, {})[address] = changed if held is None else Changed(held.was, changed.now)
+        objects = self._found.setdefault(device, _Found()).objects
+        held = objects.get(address)
+        objects[address] = changed if held is None else Changed(held.was, changed.now)
+        await self._keep()
+
+    async def note_nmt(self, device: str, state: NmtState) -> None:
+        """The node is about to be started; it was in ``state``. The first one counts. Raises StoreError."""
+        found = self._found.setdefault(device, _Found())
+        found.nmt = found.nmt or state
         await self._keep()
 
     async def forget(self, device: str, address: Address) -> None:
         """It holds again what it held. Raises StoreError."""
-        if self._found.get(device, {}).pop(address, None) is None:
-            return
-        if not self._found[device]:
+        if device in self._found and self._found[device].objects.pop(address, None) is not None:
+            await self._tidy(device)
+
+    async def forget_nmt(self, device: str) -> None:
+        """The node has its NMT state again. Raises StoreError."""
+        if device in self._found:
+            self._found[device].nmt = None
+            await self._tidy(device)
+
+    async def _tidy(self, device: str) -> None:
+        found = self._found[device]
+        if not found.objects and found.nmt is None:
             del self._found[device]
         await self._keep()
 
     async def _keep(self) -> None:
-        document = _document(self._found)
+        document = {device: _document(found) for device, found in self._found.items()}
         if self._store is not None:
             await self._store.run(lambda connection: put_setting(connection, KEY, document))
 
 
-_Found = dict[str, dict[Address, Changed]]
-
-
 def _document(found: _Found) -> dict[str, Any]:
-    return {
-        device: [[address.short, changed.was.hex(), changed.now.hex()] for address, changed in objects.items()]
-        for device, objects in found.items()
-    }
+    objects = [[address.short, changed.was.hex(), changed.now.hex()] for address, changed in found.objects.items()]
+    return {"objects": objects, "nmt": None if found.nmt is None else found.nmt.name}
 
 
-def _read(document: Any) -> _Found:
+def _read(document: Any) -> dict[str, _Found]:
     if not isinstance(document, dict):
         return {}
     return {
-        device: {parse_address(text): Changed(bytes.fromhex(was), bytes.fromhex(now)) for text, was, now in objects}
-        for device, objects in document.items()
+        device: _Found(
+            {
+                parse_address(text): Changed(bytes.fromhex(was), bytes.fromhex(now))
+                for text, was, now in found["objects"]
+            },
+            None if found["nmt"] is None else NmtState[found["nmt"]],
+        )
+        for device, found in document.items()
     }

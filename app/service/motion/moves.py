@@ -1,4 +1,4 @@
-"""What an axis can be told to do at the desk: jog, move to an angle, home, reset its fault."""
+"""What an axis can be told to do at the desk: jog, move to an angle, be held enabled, home, reset its fault."""
 
 from __future__ import annotations
 
@@ -31,6 +31,8 @@ LOWEST: Final = Address(0x607D, 1)
 HIGHEST: Final = Address(0x607D, 2)
 MOST_DPS: Final = 5.0
 """The fastest that a person moves a blade by hand."""
+LEFT_ALONE: Final = (Ended.SILENT, Ended.LEASE, Ended.LINK, Ended.STOPPED)
+"""A quick stop is under way, or somebody else has commanded the axis."""
 _LOOK_S: Final = 0.02
 _HOME_TOLERANCE_DEG: Final = 0.1
 _MARGIN_S: Final = 0.25
@@ -46,9 +48,9 @@ async def jog(desk: MotionDesk, slug: str, fence: int, speed_dps: float, journal
 
     async def work(running: Running) -> None:
         control = running.control
-        raw = await _raw(control, TARGET_VELOCITY, speed_dps)
+        raw = await raw_of(control, TARGET_VELOCITY, speed_dps)
         await control.set_mode(AxisMode.PROFILE_VELOCITY)
-        await _set(control, TARGET_VELOCITY, raw, journal)
+        await set_object(control, TARGET_VELOCITY, raw, journal)
         if running.over.is_set():
             return
         try:
@@ -58,7 +60,7 @@ async def jog(desk: MotionDesk, slug: str, fence: int, speed_dps: float, journal
                 control.word(Word.RUN)
                 await _until_limit(running, speed_dps)
         finally:
-            await _come_to_rest(running)
+            await come_to_rest(running)
 
     await desk.move(slug, fence, Doing.JOG, work)
 
@@ -76,8 +78,8 @@ async def move_to(
         control = running.control
         await _require_within(control, angle_deg)
         await control.set_mode(AxisMode.PROFILE_POSITION)
-        await _set(control, PROFILE_VELOCITY, await _raw(control, PROFILE_VELOCITY, abs(speed_dps)), journal)
-        await _set(control, TARGET_POSITION, await _raw(control, TARGET_POSITION, angle_deg), journal)
+        await set_object(control, PROFILE_VELOCITY, await raw_of(control, PROFILE_VELOCITY, abs(speed_dps)), journal)
+        await set_object(control, TARGET_POSITION, await raw_of(control, TARGET_POSITION, angle_deg), journal)
         if running.over.is_set():
             return
         try:
@@ -91,34 +93,53 @@ async def move_to(
                     control.word(Word.RUN)
                     await _until_reached(running)
         finally:
-            await _come_to_rest(running)
+            await come_to_rest(running)
 
     await desk.move(slug, fence, Doing.MOVE, work)
 
 
 async def reset_fault(desk: MotionDesk, slug: str, fence: int, journal: Journal) -> AxisState:
-    """Reset the fault of a prepared axis; the state that came of it. Nothing moves by it."""
+    """Reset the fault of an axis, prepared or not; the state that came of it. Nothing moves by it."""
     found: list[AxisState] = []
 
     async def work(running: Running) -> None:
         found.append(await running.control.reset_fault())
         journal.note(Kind.FAULT_RESET, slug, state=found[0].name.lower())
 
-    await desk.move(slug, fence, Doing.RESET, work, held=False)
+    await desk.without_proof(slug, fence, Doing.RESET, work)
     return found[0]
+
+
+async def hold(desk: MotionDesk, slug: str, fence: int) -> None:
+    """Have the axis enabled and standing, brake lifted, while it is held. Raises what ``MotionDesk.move`` raises."""
+
+    async def work(running: Running) -> None:
+        control = running.control
+        await control.set_mode(AxisMode.PROFILE_VELOCITY)
+        if running.over.is_set():
+            return
+        try:
+            await control.enable()
+            running.turning = True
+            await until_over(running)
+        finally:
+            await come_to_rest(running)
+
+    await desk.move(slug, fence, Doing.HOLD, work)
 
 
 async def home(desk: MotionDesk, slug: str, fence: int, angle_deg: float, journal: Journal) -> None:
     """Take the present position of an axis without power for ``angle_deg`` (homing method 35, manual 5.14).
 
-    Raises what ``MotionDesk.move`` raises, AxisStateError where the axis does not confirm it, UnverifiedError where it
-    stands elsewhere by its own word: the bits that confirm may be those of an earlier time.
+    Raises what ``MotionDesk.move`` raises, AxisStateError where the axis has power, moves or does not confirm it,
+    UnverifiedError where it stands elsewhere by its own word: the bits that confirm may be those of an earlier time.
     """
 
     async def work(running: Running) -> None:
         control = running.control
+        await control.require_at_rest()
         await control.set_mode(AxisMode.HOMING)
-        await _set(control, TARGET_POSITION, await _raw(control, TARGET_POSITION, angle_deg), journal)
+        await set_object(control, TARGET_POSITION, await raw_of(control, TARGET_POSITION, angle_deg), journal)
         control.word(Word.SHUTDOWN)
         await control.until({AxisState.READY})
         control.word(Word.HOME)
@@ -133,19 +154,31 @@ async def home(desk: MotionDesk, slug: str, fence: int, angle_deg: float, journa
 # -- steps ------------------------------------------------------------------------------------
 
 
+async def until_over(running: Running) -> None:
+    """Wait until it is let go, or somebody else or the axis itself ends it."""
+    while not running.over.is_set():
+        await _go_on(running)
+
+
+async def _go_on(running: Running) -> None:
+    """One look at an axis that is to stay enabled."""
+    control = running.control
+    if control.overtaken or await control.state() is not AxisState.OPERATION_ENABLED:
+        running.end(Ended.STOPPED)
+    else:
+        await wait(running)
+
+
 async def _until_limit(running: Running, speed_dps: float) -> None:
     """Wait until it is let go, or until the blade comes near the limit towards which it turns."""
     control = running.control
-    low_deg, high_deg = await _degrees(control, LOWEST), await _degrees(control, HIGHEST)
+    low_deg, high_deg = await degrees(control, LOWEST), await degrees(control, HIGHEST)
     while not running.over.is_set():
-        ahead_deg = await _degrees(control, POSITION) + speed_dps * _MARGIN_S
+        ahead_deg = await degrees(control, POSITION) + speed_dps * _MARGIN_S
         if (speed_dps < 0 and ahead_deg <= low_deg) or (speed_dps > 0 and ahead_deg >= high_deg):
             running.end(Ended.LIMIT)
             return
-        if control.overtaken or await control.state() is not AxisState.OPERATION_ENABLED:
-            running.end(Ended.STOPPED)
-            return
-        await _wait(running)
+        await _go_on(running)
 
 
 async def _until_reached(running: Running) -> None:
@@ -156,23 +189,24 @@ async def _until_reached(running: Running) -> None:
         elif status & TARGET_REACHED and not status & ACKNOWLEDGED:
             running.end(Ended.DONE)
         else:
-            await _wait(running)
+            await wait(running)
 
 
-async def _wait(running: Running) -> None:
+async def wait(running: Running) -> None:
+    """Until the next look, or until it is over."""
     try:
         await asyncio.wait_for(running.over.wait(), _LOOK_S)
     except TimeoutError:
         return
 
 
-async def _come_to_rest(running: Running) -> None:
+async def come_to_rest(running: Running) -> None:
     """Halt, wait until the blade stands, then no power and the brake engaged.
 
     Where a quick stop is under way, or somebody else has commanded the axis, it is left to that.
     """
     control = running.control
-    if running.why in (Ended.SILENT, Ended.LEASE, Ended.LINK, Ended.STOPPED):
+    if running.why in LEFT_ALONE:
         return
     control.word(Word.HALT)
     await control.until_still()
@@ -180,7 +214,7 @@ async def _come_to_rest(running: Running) -> None:
 
 
 async def _require_at(control: Control, angle_deg: float) -> None:
-    found_deg = await _degrees(control, POSITION)
+    found_deg = await degrees(control, POSITION)
     if abs(found_deg - angle_deg) > _HOME_TOLERANCE_DEG:
         raise UnverifiedError(
             address=POSITION.short,
@@ -191,18 +225,21 @@ async def _require_at(control: Control, angle_deg: float) -> None:
         )
 
 
-async def _set(control: Control, address: Address, raw: Raw, journal: Journal) -> None:
+async def set_object(control: Control, address: Address, raw: Raw, journal: Journal) -> None:
+    """Write an object that moves an axis. Raises what ``write_raw`` raises."""
     await write_raw(control.driver, control.target, address, raw, journal, allow=Allow.MOTION)
 
 
-async def _raw(control: Control, address: Address, number: float) -> Raw:
+async def raw_of(control: Control, address: Address, number: float) -> Raw:
+    """What an object holds for a scaled number. Raises LimitError and what reading raises."""
     target = control.target
     entry = target.entry(address)
     await know_what_it_rests_on(control.driver, target, entry)
     return parse(target.description, entry, f"{number:.3f}".rstrip("0").rstrip("."), target.lookup)
 
 
-async def _degrees(control: Control, address: Address) -> float:
+async def degrees(control: Control, address: Address) -> float:
+    """An angle of the axis, or its speed, by its own word."""
     entry = control.target.entry(address)
     found = to_scaled(entry, await control.number(address), control.target.lookup)
     return 0.0 if found is None else float(found.number)
@@ -210,7 +247,7 @@ async def _degrees(control: Control, address: Address) -> float:
 
 async def _require_within(control: Control, angle_deg: float) -> None:
     """Raises LimitError: the drive would adjust a target outside its limits and go there (manual 5.10)."""
-    low_deg, high_deg = await _degrees(control, LOWEST), await _degrees(control, HIGHEST)
+    low_deg, high_deg = await degrees(control, LOWEST), await degrees(control, HIGHEST)
     if not low_deg <= angle_deg <= high_deg:
         raise _beyond(control.target, TARGET_POSITION, angle_deg, low_deg, high_deg)
 

@@ -43,15 +43,13 @@ _NMT_TIMEOUT_S: Final = 2.0
 
 @dataclass
 class Prepared:
-    """An axis that may move. ``settings``: what must stand there; ``started``: by NMT, by us.
+    """An axis that may move. ``settings``: what must stand there.
 
     ``proof_s``: so long after our last heartbeat it had left operation enabled by itself; None: not proven yet.
     """
 
     control: Control
     settings: dict[Address, bytes] = field(default_factory=dict)
-    nmt_before: NmtState | None = None
-    started: bool = False
     proof_s: float | None = None
 
     @property
@@ -73,11 +71,10 @@ async def set_up(axis: Prepared, heartbeat: Heartbeat, left: Left, journal: Jour
     heartbeat.watch(axis.slug)
     view = control.target.live.node(control.target.device.bus, control.target.node)
     state = None if view is None else view.state
-    if not axis.started:
-        axis.nmt_before = state
     if state is not NmtState.OPERATIONAL:
+        # What nobody told is taken for pre-operational: so a node is that no master has started.
+        await left.note_nmt(axis.slug, state or NmtState.PRE_OPERATIONAL)
         control.driver.nmt(NmtCommand.START, control.target.node)
-        axis.started = True
         journal.note(Kind.NMT_SENT, axis.slug, command="start", was=_name(state))
         await _until_operational(control)
 
@@ -194,16 +191,15 @@ async def put_back(control: Control, left: Left, journal: Journal) -> None:
         await left.forget(slug, address)
 
 
-def leave(axis: Prepared, heartbeat: Heartbeat, journal: Journal) -> None:
-    """Our heartbeat ends for the axis, and the node gets its NMT state back. Raises BusLostError, ConsentError."""
-    control = axis.control
-    heartbeat.forget(axis.slug)
-    if axis.started:
-        # What nobody told is taken for pre-operational: so a node is that no master has started.
-        command = NmtCommand.STOP if axis.nmt_before is NmtState.STOPPED else NmtCommand.PRE_OPERATIONAL
+async def give_nmt_back(control: Control, left: Left, journal: Journal) -> None:
+    """The node gets the NMT state back that it had. Raises BusLostError, ConsentError, StoreError."""
+    slug = control.target.slug
+    before = left.nmt_of(slug)
+    if before is not None:
+        command = NmtCommand.STOP if before is NmtState.STOPPED else NmtCommand.PRE_OPERATIONAL
         control.driver.nmt(command, control.target.node)
-        axis.started = False
-        journal.note(Kind.NMT_SENT, axis.slug, command=command.name.lower(), was="operational")
+        journal.note(Kind.NMT_SENT, slug, command=command.name.lower(), was="operational")
+        await left.forget_nmt(slug)
 
 
 async def _until_operational(control: Control) -> None:

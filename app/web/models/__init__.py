@@ -385,7 +385,8 @@ class Subscribe(BaseModel):
 class Beat(BaseModel):
     """The dead man: a page that has the lease says that it is there, and whether its person holds what moves an axis.
 
-    ``fence`` is the number of the lease, ``number`` rises with each beat, ``order`` is that of what is held.
+    ``fence`` is the number of the lease, ``number`` rises with each beat, ``order`` is that of what is held,
+    ``sent_ms`` the page's own clock when the beat left it: by it the server knows a line that grows slower.
     """
 
     model_config = ConfigDict(extra="forbid")
@@ -396,6 +397,7 @@ class Beat(BaseModel):
     number: int
     holding: bool
     order: int = 0
+    sent_ms: Annotated[float, Field(ge=0, allow_inf_nan=False)]
 
 
 ClientMessage = Annotated[Subscribe | Beat, Field(discriminator="type")]

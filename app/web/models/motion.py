@@ -6,6 +6,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from app.service.motion.brake_test import BrakeTest
 from app.service.motion.interlocks import Standing
 
 Page = Annotated[str, Field(min_length=1, max_length=64)]
@@ -117,3 +118,38 @@ class MovedDoc(BaseModel):
     """How it ended; the end of a text key ``motion.ended``."""
 
     why: str
+
+
+class FeatheredDoc(MovedDoc):
+    """The EFC drive of one axis: from where to where, its target (567Ah), and how long it took."""
+
+    from_deg: float
+    to_deg: float
+    target_deg: float
+    took_s: float
+
+
+class BrakeTestDoc(MovedDoc):
+    """What the brake did; null for what the test did not come to. ``verdict``: end of a text key ``brake_verdict``."""
+
+    verdict: str | None
+    lifted_s: float | None
+    turned_deg: float | None
+    engaged_s: float | None
+    drift_deg: float | None
+
+    @classmethod
+    def of(cls, why: str, found: BrakeTest) -> BrakeTestDoc:
+        """The document of one that ended so."""
+        return cls(
+            why=why,
+            verdict=None if found.verdict is None else found.verdict.value,
+            lifted_s=_rounded(found.lifted_s),
+            turned_deg=_rounded(found.turned_deg),
+            engaged_s=_rounded(found.engaged_s),
+            drift_deg=_rounded(found.drift_deg),
+        )
+
+
+def _rounded(number: float | None) -> float | None:
+    return None if number is None else round(number, 3)

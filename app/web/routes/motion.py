@@ -12,13 +12,17 @@ from fastapi import APIRouter, Depends
 from app.errors import NotConnectedError
 from app.model.roles import Role
 from app.service.motion import moves
+from app.service.motion.brake_test import try_brake
 from app.service.motion.desk import MotionDesk
+from app.service.motion.feathering import feather
 from app.service.motion.interlocks import Confirmed
 from app.service.motion.line import MotionLine, motion_line
 from app.web.deps import DEVICE, BenchOf, JournalOf, PersonOf, TargetOf, needs
 from app.web.models.motion import (
     AnswerRequest,
+    BrakeTestDoc,
     ConfirmRequest,
+    FeatheredDoc,
     FenceRequest,
     HomeRequest,
     InterlockDoc,
@@ -146,6 +150,43 @@ async def reset(desk: DeskOf, target: TargetOf, journal: JournalOf, request: Ord
     desk.admit(request.fence, request.order)
     await moves.reset_fault(desk, target.slug, request.fence, journal)
     return _moved(desk)
+
+
+@router.post(MOTION + "/hold", dependencies=[TECHNICIAN])
+async def hold(desk: DeskOf, target: TargetOf, request: OrderRequest) -> MovedDoc:
+    """Have the axis enabled and standing, brake lifted, as long as it is held."""
+    desk.admit(request.fence, request.order)
+    await moves.hold(desk, target.slug, request.fence)
+    return _moved(desk)
+
+
+@router.post(MOTION + "/feather", dependencies=[TECHNICIAN])
+async def feather_one(desk: DeskOf, target: TargetOf, request: OrderRequest) -> FeatheredDoc:
+    """Try the EFC of one axis by its controlword, as long as it is held; let go, it stops by its quick stop."""
+    desk.admit(request.fence, request.order)
+    found = await feather(desk, target.slug, request.fence)
+    return FeatheredDoc(
+        why=_moved(desk).why,
+        from_deg=found.from_deg,
+        to_deg=found.to_deg,
+        target_deg=found.target_deg,
+        took_s=round(found.took_s, 2),
+    )
+
+
+@router.post(MOTION + "/brake-test", dependencies=[TECHNICIAN])
+async def brake_test(desk: DeskOf, target: TargetOf, journal: JournalOf, request: OrderRequest) -> BrakeTestDoc:
+    """Try whether the brake lifts and holds, as long as it is held: the blade turns by half a degree, then rests."""
+    desk.admit(request.fence, request.order)
+    found = await try_brake(desk, target.slug, request.fence, journal)
+    return BrakeTestDoc.of(_moved(desk).why, found)
+
+
+@router.post(MOTION + "/halt", dependencies=[TECHNICIAN])
+async def halt(desk: DeskOf, target: TargetOf, request: FenceRequest) -> MotionLine:
+    """Halt one axis by its ramp, whoever has it run; it stays enabled where it was not this desk."""
+    await desk.halt(target.slug, request.fence)
+    return motion_line(desk)
 
 
 def _moved(desk: MotionDesk) -> MovedDoc:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from fastapi import APIRouter
 
 from app.service.stop import AxisOutcome, Command, command_all
-from app.web.deps import ConnectionOf, JournalOf
+from app.web.deps import DEVICE, ConnectionOf, JournalOf, TargetOf
 from app.web.models import AxisDone, Nothing, StopDone
 from app.web.routes.jobs import failure
 
@@ -22,6 +22,13 @@ async def stop(connection: ConnectionOf, journal: JournalOf, _request: Nothing) 
 async def feather(connection: ConnectionOf, journal: JournalOf, _request: Nothing) -> StopDone:
     """FEATHER to every axis. This is no safety function."""
     return _stop_done(await command_all(connection.axes(), Command.FEATHER, journal, connection.stamper))
+
+
+@router.post(DEVICE + "/stop")
+async def stop_one(connection: ConnectionOf, journal: JournalOf, target: TargetOf, _request: Nothing) -> StopDone:
+    """STOP to one axis: its quick stop, on the same path. A device that is no axis is none of those stopped."""
+    axes = [axis for axis in connection.axes() if axis.target is target]
+    return _stop_done(await command_all(axes, Command.STOP, journal, connection.stamper))
 
 
 def _stop_done(outcomes: list[AxisOutcome]) -> StopDone:

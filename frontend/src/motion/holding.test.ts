@@ -28,7 +28,7 @@ function page(open = true) {
     if (state.open) sent.push(beat);
     return state.open;
   };
-  return { holding: new Holding("page", send, clock), sent, clock, state };
+  return { holding: new Holding("page", send, clock, () => 5), sent, clock, state };
 }
 
 describe("holding", () => {
@@ -78,7 +78,7 @@ describe("holding", () => {
     holding.own(8);
     expect(holding.next()).toEqual({ fence: 8, order: 1 });
     holding.press(1);
-    expect(sent.at(-1)).toEqual({ page: "page", fence: 8, number: 1, holding: true, order: 1 });
+    expect(sent.at(-1)).toEqual({ page: "page", fence: 8, number: 1, holding: true, order: 1, sent_ms: 5 });
   });
 
   it("goes on counting where the same lease is had again", () => {
@@ -90,7 +90,7 @@ describe("holding", () => {
     holding.own(7);
     expect(holding.next()).toEqual({ fence: 7, order: 2 });
     holding.press(2);
-    expect(sent.at(-1)).toEqual({ page: "page", fence: 7, number: 2, holding: true, order: 2 });
+    expect(sent.at(-1)).toEqual({ page: "page", fence: 7, number: 2, holding: true, order: 2, sent_ms: 5 });
   });
 
   it("keeps what it has where the same lease is told again", () => {

@@ -20,6 +20,8 @@ const browserClock: Clock = {
   },
 };
 
+const nowMs = () => performance.now();
+
 export class Holding {
   /** The number of our lease; null without one. */
   fence: number | null = null;
@@ -31,8 +33,15 @@ export class Holding {
   private readonly page: string;
   private readonly send: (beat: Beat) => boolean;
   private readonly clock: Clock;
+  private readonly nowMs: () => number;
 
-  constructor(page: string, send: (beat: Beat) => boolean, clock: Clock = browserClock) {
+  constructor(
+    page: string,
+    send: (beat: Beat) => boolean,
+    clock: Clock = browserClock,
+    now: () => number = nowMs,
+  ) {
+    this.nowMs = now;
     this.page = page;
     this.send = send;
     this.clock = clock;
@@ -95,6 +104,7 @@ export class Holding {
       number: this.number,
       holding: this.held !== null,
       order: this.held ?? 0,
+      sent_ms: this.nowMs(),
     });
   }
 }

@@ -241,6 +241,7 @@ async def test_what_a_killed_server_left_is_put_back_by_the_next(connection: Con
     fence = after.take_lease("tester", "next").fence
     await after.put_back(AXIS, fence)
     assert (await number(connection, ABORT), await number(connection, WATCH)) == before
+    await until(lambda: nmt_state(connection) is NmtState.PRE_OPERATIONAL)
     assert motion_line(after).left == ()
     await after.close()
 

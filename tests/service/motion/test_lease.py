@@ -128,3 +128,45 @@ def test_what_was_let_go_by_us_must_be_pressed_anew(clock: Clock) -> None:
         held.append(man.holding)
     assert held == [False, False, False, True], "the same press holds nothing any more"
     assert man.present
+
+
+def test_a_line_that_grows_slower_holds_nothing_any_more(clock: Clock) -> None:
+    man = DeadMan(clock)
+    man.start(1)
+    sent_s, start_s = 5000.0, clock.s
+    held_at_ms = []
+    for number in range(1, 30):
+        way_s = 0.02 + max(0, number - 5) * 0.02  # each beat takes 20 ms longer than the one before
+        clock.s = start_s + 0.1 * number + way_s
+        man.beat(1, number, holding=True, sent_s=sent_s + 0.1 * number)
+        if man.holding:
+            held_at_ms.append(round(1000 * way_s))
+    assert max(held_at_ms) == pytest.approx(1000 * (SILENCE_S + 0.02), abs=25)
+
+
+def test_the_shortest_way_is_the_measure_whatever_both_clocks_show(clock: Clock) -> None:
+    man = DeadMan(clock)
+    man.start(1)
+    held = []
+    man.beat(1, 1, holding=True, sent_s=clock.s + 3600.0)  # the page's clock is an hour ahead
+    held.append(man.holding)
+    clock.s += 0.1
+    man.beat(1, 2, holding=True, sent_s=clock.s + 3600.0 - 0.25)
+    for after_s in (0.04, 0.02):
+        clock.s += after_s
+        held.append(man.holding)
+    man.start(2)
+    man.beat(2, 1, holding=True, sent_s=0.0)
+    held.append(man.holding)
+    assert held == [True, True, False, True], "it was 250 ms under way; another lease measures anew"
+
+
+def test_clocks_that_run_apart_do_not_stop_an_axis(clock: Clock) -> None:
+    man = DeadMan(clock)
+    man.start(1)
+    start_s = clock.s
+    for number in range(1, 9000):  # a quarter of an hour
+        clock.s = start_s + 0.1 * number
+        man.beat(1, number, holding=True, sent_s=0.1 * number * (1 - 2e-4))
+        assert man.holding
+        assert man.silent_s == pytest.approx(0.0, abs=0.001)

@@ -132,7 +132,7 @@ class Page:
     async def _beat(self) -> None:
         self.number += 1
         beat = {"type": "beat", "page": self.name, "fence": self.fence, "number": self.number, "holding": self.holding}
-        beat["order"] = self.held_order
+        beat |= {"order": self.held_order, "sent_ms": 1000 * monotonic()}
         await self.socket.send(json.dumps(beat))
 
     async def _beat_forever(self) -> None:

@@ -98,6 +98,7 @@ async def test_old_and_new_values_and_the_undo_set_are_kept_for_good(bench: Benc
                 assert undo.values[parse_address(address)] == raw
 
 
+@pytest.mark.alone  # the twin waits for the disk in the middle of a transfer
 async def test_each_intent_is_on_the_disk_before_its_write_leaves(bench: Bench, served: Served) -> None:
     """At the instant of every write and save another reader of the store finds its intent there."""
     seen: list[bool] = []
