@@ -129,6 +129,7 @@ export const commands = {
   consent: () => post<object>("/api/live/consent", {}),
   stop: () => post<StopResult>("/api/live/stop", {}),
   feather: () => post<StopResult>("/api/live/feather", {}),
+  stopOne: (slug: string) => post<StopResult>(`${device(slug)}/stop`, {}),
   backup: (reason: string) => post<Job>("/api/live/backup", { reason }),
   cancel: (id: string) => request<Job>(`/api/live/jobs/${id}`, { method: "DELETE" }),
 };

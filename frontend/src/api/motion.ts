@@ -10,6 +10,8 @@ export type Lease = Schemas["LeaseDoc"];
 export type Interlock = Schemas["InterlockDoc"];
 export type Moved = Schemas["MovedDoc"];
 export type Prepared = Schemas["PreparedDoc"];
+export type Feathered = Schemas["FeatheredDoc"];
+export type BrakeTest = Schemas["BrakeTestDoc"];
 
 /** Every order bears the number of the lease, and one of its own that rises. */
 export interface Order {
@@ -47,5 +49,9 @@ export const moving = {
     send<Moved>("POST", `${axis(slug)}/move`, { ...order, angle_deg: angleDeg, speed_dps: speedDps }),
   home: (slug: string, order: Order, angleDeg: number) =>
     send<Moved>("POST", `${axis(slug)}/home`, { ...order, angle_deg: angleDeg }),
+  hold: (slug: string, order: Order) => send<Moved>("POST", `${axis(slug)}/hold`, order),
+  feather: (slug: string, order: Order) => send<Feathered>("POST", `${axis(slug)}/feather`, order),
+  brakeTest: (slug: string, order: Order) => send<BrakeTest>("POST", `${axis(slug)}/brake-test`, order),
+  halt: (slug: string, fence: number) => send<MotionData>("POST", `${axis(slug)}/halt`, { fence }),
   reset: (slug: string, order: Order) => send<Moved>("POST", `${axis(slug)}/reset`, order),
 };

@@ -1,4 +1,4 @@
-import { type KeyboardEvent, type PointerEvent, type ReactNode, useEffect } from "react";
+import { type KeyboardEvent, type PointerEvent, type ReactNode, useEffect, useRef } from "react";
 import classes from "./Motion.module.css";
 import { holding } from "./lease";
 
@@ -13,15 +13,30 @@ interface Props {
   testId: string;
 }
 
+/** A finger that slips so far from where it pressed does not mean this button any more. */
+const SLIP_PX = 60;
+
 const isRunKey = (event: KeyboardEvent) => event.key === "Enter" || event.key === " ";
 
-/** Hold to run: what it commands goes on exactly as long as it is pressed, by pointer, Enter or Space. */
+/**
+ * Hold to run: what it commands goes on exactly as long as it is pressed, by pointer, Enter or Space. What counts is where
+ * the pointer goes, not the button: that may move when a line above it changes.
+ */
 export function RunButton({ children, hint, disabled, active, onPress, testId }: Props) {
-  const letGo = () => holding.letGo();
+  const pressedAt = useRef({ x: 0, y: 0 });
+  // Another button that was pressed before loses the focus only now: it has nothing to let go.
+  const pressed = useRef(false);
+  const letGo = () => {
+    if (!pressed.current) return;
+    pressed.current = false;
+    holding.letGo();
+  };
   // A button that goes away under the finger lets go too.
   useEffect(() => letGo, []);
   const press = () => {
-    if (!disabled && !holding.holding) onPress();
+    if (disabled || holding.holding) return;
+    pressed.current = true;
+    onPress();
   };
   return (
     <button
@@ -31,11 +46,18 @@ export function RunButton({ children, hint, disabled, active, onPress, testId }:
       data-testid={testId}
       aria-disabled={disabled}
       onPointerDown={(event: PointerEvent) => {
-        if (event.button === 0) press();
+        if (event.button !== 0) return;
+        event.currentTarget.setPointerCapture(event.pointerId);
+        pressedAt.current = { x: event.clientX, y: event.clientY };
+        press();
+      }}
+      onPointerMove={(event: PointerEvent) => {
+        const { x, y } = pressedAt.current;
+        if (Math.hypot(event.clientX - x, event.clientY - y) > SLIP_PX) letGo();
       }}
       onPointerUp={letGo}
-      onPointerLeave={letGo}
       onPointerCancel={letGo}
+      onLostPointerCapture={letGo}
       onBlur={letGo}
       onContextMenu={(event) => event.preventDefault()}
       onKeyDown={(event) => {

@@ -59,8 +59,8 @@ function Blade({ station }: { station: StationRef }) {
   const [{ replay }] = usePageSearch();
   return (
     <div className={`${classes.panels} bench`}>
-      {pmc && replay === undefined && <MotionPanel device={pmc} />}
-      <section className={classes.panel} aria-label={t("page.axis.machine")}>
+      {pmc && replay === undefined && <MotionPanel device={pmc} context={contexts.pmc} />}
+      <section className={`${classes.panel} ${classes.plots}`} aria-label={t("page.axis.machine")}>
         <h2>{t("page.axis.machine")}</h2>
         <StateDiagram state={axis?.state ?? null} stale={axis?.stale ?? true} />
       </section>

@@ -1,4 +1,4 @@
-import { Button, NumberInput } from "@mantine/core";
+import { NumberInput } from "@mantine/core";
 import { useState } from "react";
 import { moving, type Order } from "../../api/motion";
 import { useAxes } from "../../live/live";
@@ -6,11 +6,12 @@ import { Control, useControl } from "../../motion/lease";
 import motion from "../../motion/Motion.module.css";
 import { OrderProblem } from "../../motion/OrderProblem";
 import { RunButton } from "../../motion/RunButton";
-import { travel } from "../../motion/travel";
 import { useOrder } from "../../motion/useOrder";
+import type { DeviceContext } from "../../model/shown";
 import { figure } from "../../model/values";
 import { useTexts } from "../../texts/texts";
 import { typedNumber } from "../../ui/typedNumber";
+import { Preview } from "./Preview";
 
 /** The fastest by hand; the server refuses more. */
 const MOST_DPS = 5;
@@ -22,8 +23,8 @@ enum Way {
   To = "to",
 }
 
-/** Hold to run: jog to either side, or move to an angle; and the reset of a fault. */
-export function MoveSection({ device }: { device: string }) {
+/** Hold to run: jog to either side, or move to an angle, with what will come of it. */
+export function MoveSection({ device, context }: { device: string; context: DeviceContext | null }) {
   const t = useTexts();
   const { motion: line, state } = useControl();
   const order = useOrder();
@@ -39,7 +40,6 @@ export function MoveSection({ device }: { device: string }) {
     order.mutate({ held: true, work });
   };
   const active = (way: Way) => doing !== null && pressed === way;
-  const trip = axis?.position_deg == null ? null : travel(angle - axis.position_deg, speed);
   return (
     <section aria-label={t("page.motion.move")}>
       <h3>{t("page.motion.move")}</h3>
@@ -89,11 +89,7 @@ export function MoveSection({ device }: { device: string }) {
           {t("page.motion.jog")} ▶
         </RunButton>
         <RunButton
-          hint={
-            trip === null
-              ? t("page.motion.hold")
-              : t("page.motion.trip", { seconds: figure(trip, 1, t.language) })
-          }
+          hint={t("page.motion.hold")}
           disabled={!ready || busy}
           active={active(Way.To)}
           onPress={() => hold(Way.To, (one) => moving.move(device, one, angle, speed))}
@@ -103,20 +99,15 @@ export function MoveSection({ device }: { device: string }) {
         </RunButton>
       </div>
       <div className={motion.row}>
-        <Button
-          variant="default"
-          disabled={!ready || busy}
-          onClick={() => order.mutate({ held: false, work: (one) => moving.reset(device, one) })}
-          data-testid="reset-fault"
-        >
-          {t("page.motion.reset")}
-        </Button>
         <span className={motion.ended} data-testid="motion-ended">
           {line?.ended?.device === device &&
             doing === null &&
             `${t(`motion.doing.${line.ended.doing}`)}: ${t(`motion.ended.${line.ended.why}`)}`}
         </span>
       </div>
+      {context && axis?.position_deg != null && (
+        <Preview context={context} fromDeg={axis.position_deg} toDeg={angle} speedDps={speed} />
+      )}
       <OrderProblem error={order.error} title={t("page.motion.order_failed")} />
     </section>
   );
