@@ -145,7 +145,8 @@ function EntryRows({ entry, context, partner, open, onToggle }: EntryProps) {
   const Chevron = shown ? IconChevronDown : IconChevronRight;
   return (
     <tbody data-testid={`error-${at}`}>
-      <tr className={own.entry}>
+      {/* A click anywhere in the row, for gloves; that of the button, also by key, comes up to here. */}
+      <tr className={own.entry} onClick={code === null ? undefined : onToggle}>
         <td>
           {code === null ? (
             <strong>–</strong>
@@ -157,7 +158,6 @@ function EntryRows({ entry, context, partner, open, onToggle }: EntryProps) {
               aria-controls={shown ? id : undefined}
               aria-label={t("page.aid.toggle", { code: errorCode(code) })}
               title={t("page.entry.raw_only", { raw })}
-              onClick={onToggle}
             >
               <Chevron size={16} aria-hidden />
               {errorCode(code)}
