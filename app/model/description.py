@@ -171,12 +171,29 @@ class Enumeration:
 
 @dataclass(frozen=True, slots=True)
 class ErrorCode:
-    """An error code of the device (EMCY, error field) with its text."""
+    """An error code of the device (EMCY, error field) with its texts.
+
+    ``aid`` names the texts of its cause and of first aid: those of a family where several codes tell the same
+    (battery bloc 1 to 8), of the device where another one means something else by the same name; else ``name``.
+    ``number`` is its number in the family and fills the placeholder {number} of the texts.
+    """
 
     code: int
     name: str
     text_key: str
     reaction: str = ""
+    aid: str = ""
+    number: int | None = None
+
+    @property
+    def cause_key(self) -> str:
+        """Text: what the device has seen, and which objects decide."""
+        return f"error_cause.{self.aid or self.name}"
+
+    @property
+    def first_aid_key(self) -> str:
+        """Text: what to do, one step a line."""
+        return f"first_aid.{self.aid or self.name}"
 
 
 @dataclass(frozen=True, slots=True)

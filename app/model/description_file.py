@@ -55,6 +55,7 @@ _TOP_KEYS: Final = frozenset(
     "schema id version name vendor bus addressing manual match save load variant group bit_table enumeration error "
     "object".split()
 )
+_ERROR_KEYS: Final = frozenset(("code", "name", "reaction", "aid", "number"))
 _OWN_KEYS: Final = frozenset(("index", "ind", "pnu", "kind", "subs", "elements"))
 _ROW_KEYS: Final = frozenset(
     "name section group type access pdo default saved save_category unit scale hex unit_from min max enumeration bits "
@@ -371,8 +372,17 @@ def _enumeration(table: Mapping[str, Any]) -> Enumeration:
 
 
 def _error_code(table: Mapping[str, Any]) -> ErrorCode:
+    if unknown := table.keys() - _ERROR_KEYS:
+        raise _WrongError(f"unknown key '{min(unknown)}'")
     name = _text(table, "name")
-    return ErrorCode(_int(table, "code"), name, f"error_code.{name}", str(table.get("reaction", "")))
+    return ErrorCode(
+        code=_int(table, "code"),
+        name=name,
+        text_key=f"error_code.{name}",
+        reaction=str(table.get("reaction", "")),
+        aid=_text(table, "aid") if "aid" in table else "",
+        number=_int(table, "number") if "number" in table else None,
+    )
 
 
 def _save_command(table: Mapping[str, Any]) -> SaveCommand:

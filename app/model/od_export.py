@@ -25,6 +25,7 @@ from app.model.description import (
     SaveCommand,
     VariantValues,
 )
+from app.model.texts import load_texts
 
 CSV_COLUMNS: Final = (
     "index",
@@ -99,7 +100,8 @@ def description_dict(description: Description) -> dict[str, Any]:
 
     Every key is always there; what is not given is null. Addresses are texts (``6065``, ``3110:01``, ``12/221``), also
     as the values of references. Bytes are ``{"hex": "0A0B"}``. Texts for people are keys of the locale catalogue,
-    except names of objects, which are English and are translated by the catalogue's ``name.<English name>``.
+    except names of objects, which are English and are translated by the catalogue's ``name.<English name>``. The texts
+    of an error's cause and of first aid are null where there are none; ``number`` fills their placeholder.
     """
     return {
         "schema": JSON_SCHEMA,
@@ -195,7 +197,16 @@ def _enumeration(table: Enumeration) -> dict[str, Any]:
 
 
 def _error_code(error: ErrorCode) -> dict[str, Any]:
-    return {"code": error.code, "name": error.name, "text_key": error.text_key, "reaction": error.reaction or None}
+    has = load_texts("en").has
+    return {
+        "code": error.code,
+        "name": error.name,
+        "text_key": error.text_key,
+        "reaction": error.reaction or None,
+        "cause_key": error.cause_key if has(error.cause_key) else None,
+        "first_aid_key": error.first_aid_key if has(error.first_aid_key) else None,
+        "number": error.number,
+    }
 
 
 def _commands(commands: Iterable[SaveCommand]) -> list[dict[str, Any]]:

@@ -37,6 +37,10 @@ class Texts:
     def _find(self, key: str) -> str:
         return self._texts.get(key) or self._fallback.get(key) or key
 
+    def has(self, key: str) -> bool:
+        """True where there is a text of ``key``, be it English."""
+        return key in self._texts or key in self._fallback
+
     def name(self, english: str) -> str:
         """Translation of an object's name; the description's own name where there is none."""
         return self._texts.get(f"name.{english}", english)

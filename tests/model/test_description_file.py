@@ -101,3 +101,28 @@ def test_a_missing_file_is_told(tmp_path: Path) -> None:
 
 def test_a_right_file_has_no_problems(toy_file: Path) -> None:
     assert problems(toy_file) == []
+
+
+def test_errors_share_texts_by_their_family(tmp_path: Path) -> None:
+    path = tmp_path / "toy.toml"
+    family = 'aid = "bloc_low"\nnumber = 2\n'
+    path.write_text(f'{TOY}\n[[error]]\ncode = 1\nname = "hot"\n[[error]]\ncode = 2\nname = "bloc_2_low"\n{family}')
+    hot, bloc = load(path).errors.values()
+    assert (hot.cause_key, hot.first_aid_key, hot.number) == ("error_cause.hot", "first_aid.hot", None)
+    assert (bloc.cause_key, bloc.first_aid_key, bloc.number) == ("error_cause.bloc_low", "first_aid.bloc_low", 2)
+    assert bloc.text_key == "error_code.bloc_2_low", "its name is its own"
+
+
+@pytest.mark.parametrize(
+    ("row", "reason"),
+    [
+        ('name = "hot"\nfamily = "x"', "unknown key 'family'"),
+        ('name = "hot"\naid = ""', "key 'aid'"),
+        ('name = "hot"\nnumber = "two"', "key 'number'"),
+    ],
+)
+def test_a_wrong_error_names_line_and_reason(tmp_path: Path, row: str, reason: str) -> None:
+    path = tmp_path / "wrong.toml"
+    path.write_text(f"{TOY}\n[[error]]\ncode = 1\n{row}\n", encoding="utf-8")
+    found = problems(path)
+    assert [(one.line, reason in one.reason) for one in found] == [(TOY.count("\n") + 2, True)], [str(p) for p in found]

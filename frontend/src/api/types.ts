@@ -119,6 +119,19 @@ export interface EnumerationDoc {
   values: { value: number; name: string; text_key: string }[];
 }
 
+export interface ErrorDoc {
+  code: number;
+  name: string;
+  text_key: string;
+  reaction: string | null;
+  /** What the device has seen; null where nothing is known. */
+  cause_key: string | null;
+  /** What to do, one step a line; null where nothing is known. */
+  first_aid_key: string | null;
+  /** Its number in a family that shares these texts: fills their placeholder `number`. */
+  number: number | null;
+}
+
 export interface DescriptionDoc {
   id: string;
   version: string;
@@ -129,6 +142,6 @@ export interface DescriptionDoc {
   groups: { id: string; text_key: string }[];
   bit_tables: Record<string, BitDoc[]>;
   enumerations: Record<string, EnumerationDoc>;
-  errors: { code: number; name: string; text_key: string; reaction: string | null }[];
+  errors: ErrorDoc[];
   entries: EntryDoc[];
 }

@@ -94,8 +94,8 @@ function Blade({ station }: { station: StationRef }) {
         address="30FE:03"
         pace="slow"
       />
-      <ErrorHistory device={pmc} context={contexts.pmc} />
-      <ErrorHistory device={pmm} context={contexts.pmm} />
+      <ErrorHistory device={pmc} context={contexts.pmc} partner={contexts.pmm} faults={axis?.faults ?? []} />
+      <ErrorHistory device={pmm} context={contexts.pmm} partner={contexts.pmc} faults={axis?.faults ?? []} />
     </div>
   );
 }

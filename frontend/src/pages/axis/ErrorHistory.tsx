@@ -1,8 +1,9 @@
 import { Button } from "@mantine/core";
-import { IconRefresh } from "@tabler/icons-react";
+import { IconChevronDown, IconChevronRight, IconRefresh } from "@tabler/icons-react";
 import { useMutation } from "@tanstack/react-query";
+import { useId, useState } from "react";
 import { commands } from "../../api/client";
-import type { DescriptionDoc, DeviceRef } from "../../api/types";
+import type { AxisData, DescriptionDoc, DeviceRef } from "../../api/types";
 import { NeedsRole } from "../../frame/NeedsRole";
 import { useDeviceVersion } from "../../live/live";
 import type { DeviceContext } from "../../model/shown";
@@ -10,37 +11,44 @@ import { type Translate, useTexts } from "../../texts/texts";
 import { errorCode } from "../../ui/format";
 import { notify } from "../../ui/notices";
 import { storyOf } from "../../ui/problem";
-import { useUnheard } from "../../ui/reading";
+import { entriesOf, useUnheard } from "../../ui/reading";
 import classes from "./Axis.module.css";
-
-const ENTRIES = [1, 2, 3, 4, 5, 6, 7, 8];
-/** Sub-index 0: the number of entries. */
-const COUNT = "1003";
-const entryOf = (at: number) => `1003:0${at}`;
-const stampOf = (at: number) => `2030:0${at}`;
-const LOW_WORD = 0x10000;
+import { ErrorAid, FAULT_REACTION } from "./ErrorAid";
+import { ErrorNow } from "./ErrorNow";
+import own from "./Errors.module.css";
+import { errorIn, MEMORY, type MemoryEntry, memoryOf } from "./errorMemory";
 
 interface Props {
   device: DeviceRef | undefined;
   context: DeviceContext | null;
+  /** The other device of the station. */
+  partner: DeviceContext | null;
+  /** What the devices of the blade complain of now. */
+  faults: AxisData["faults"];
 }
 
-/** The error memory of a device (1003h), newest first, with what each code means and what the device does about it. */
-export function ErrorHistory({ device, context }: Props) {
+/**
+ * What a device complains of now (603Fh) and its error memory (1003h), newest first: what each code means, why it came,
+ * what the device does about it, and what to do first.
+ */
+export function ErrorHistory({ device, context, partner, faults }: Props) {
   const t = useTexts();
   const slug = device?.slug ?? "";
   useDeviceVersion(slug);
   const silent = useUnheard(slug);
   const read = useMutation({
-    mutationFn: () => commands.read(slug, [COUNT, ...ENTRIES.flatMap((at) => [entryOf(at), stampOf(at)])]),
+    mutationFn: (addresses: string[]) => commands.read(slug, addresses),
     onError: (error) => {
       const story = storyOf(error, t);
       notify({ tone: "error", title: t("page.read.failed"), lines: [story.happened, story.next] });
     },
   });
   if (!device || !context) return null;
-  const count = context.lookup(COUNT);
+  const entries = memoryOf(context.lookup);
+  const fault = faults.find((one) => one.device === slug);
   const title = t("page.axis.history", { device: device.name });
+  // What the drive would do belongs to what the memory tells.
+  const wanted = entriesOf(context.doc).has(FAULT_REACTION) ? [...MEMORY, FAULT_REACTION] : [...MEMORY];
   return (
     <section
       className={`${classes.panel} ${classes.wide}`}
@@ -58,23 +66,45 @@ export function ErrorHistory({ device, context }: Props) {
               disabled={locked || silent}
               loading={read.isPending}
               leftSection={<IconRefresh size={16} aria-hidden />}
-              onClick={() => read.mutate()}
+              onClick={() => read.mutate(wanted)}
             >
               {t("page.read.now")}
             </Button>
           )}
         </NeedsRole>
       </h2>
-      {typeof count !== "number" && <p className="dim">{t("page.axis.history_unknown")}</p>}
-      {count === 0 && <p>{t("page.axis.history_empty")}</p>}
-      {typeof count === "number" && count > 0 && <Entries context={context} count={count} />}
+      {fault && (
+        <ErrorNow
+          key={fault.code}
+          fault={fault}
+          device={device.name}
+          context={context}
+          partner={partner}
+          silent={silent}
+        />
+      )}
+      {entries === null && <p className="dim">{t("page.axis.history_unknown")}</p>}
+      {entries?.length === 0 && <p>{t("page.axis.history_empty")}</p>}
+      {entries !== null && entries.length > 0 && (
+        <Entries entries={entries} context={context} partner={partner} now={fault?.code ?? null} />
+      )}
     </section>
   );
 }
 
-function Entries({ context, count }: { context: DeviceContext; count: number }) {
+interface EntriesProps {
+  entries: MemoryEntry[];
+  context: DeviceContext;
+  partner: DeviceContext | null;
+  /** The code that stands open above. */
+  now: number | null;
+}
+
+function Entries({ entries, context, partner, now }: EntriesProps) {
   const t = useTexts();
-  const { doc, lookup } = context;
+  const [chosen, setChosen] = useState<Record<string, boolean>>({});
+  // The newest is open by itself, but nothing is told twice.
+  const isOpen = ({ key, at, code }: MemoryEntry) => chosen[key] ?? (at === 1 && code !== now);
   return (
     <table className={classes.history}>
       <thead>
@@ -85,33 +115,75 @@ function Entries({ context, count }: { context: DeviceContext; count: number }) 
           <th title={t("page.axis.stamp_title")}>{t("page.axis.stamp")}</th>
         </tr>
       </thead>
-      <tbody>
-        {ENTRIES.slice(0, count).map((at) => {
-          const raw = lookup(entryOf(at));
-          const stamp = lookup(stampOf(at));
-          const code = typeof raw === "number" ? raw % LOW_WORD : null;
-          return (
-            <tr key={at}>
-              <td title={raw === null ? "" : t("page.entry.raw_only", { raw })}>
-                <strong>{code === null ? "–" : errorCode(code)}</strong>
-              </td>
-              <td>{code === null ? t("page.axis.entry_unread") : meaningOf(doc, code, t)}</td>
-              <td>{code === null ? "–" : reactionOf(doc, code, t)}</td>
-              <td>{stamp ?? "–"}</td>
-            </tr>
-          );
-        })}
-      </tbody>
+      {entries.map((entry) => (
+        <EntryRows
+          key={entry.key}
+          entry={entry}
+          context={context}
+          partner={partner}
+          open={isOpen(entry)}
+          onToggle={() => setChosen({ ...chosen, [entry.key]: !isOpen(entry) })}
+        />
+      ))}
     </table>
   );
 }
 
+interface EntryProps {
+  entry: MemoryEntry;
+  context: DeviceContext;
+  partner: DeviceContext | null;
+  open: boolean;
+  onToggle: () => void;
+}
+
+function EntryRows({ entry, context, partner, open, onToggle }: EntryProps) {
+  const t = useTexts();
+  const id = useId();
+  const { code, raw, at } = entry;
+  const shown = open && code !== null;
+  const Chevron = shown ? IconChevronDown : IconChevronRight;
+  return (
+    <tbody data-testid={`error-${at}`}>
+      {/* A click anywhere in the row, for gloves; that of the button, also by key, comes up to here. */}
+      <tr className={own.entry} onClick={code === null ? undefined : onToggle}>
+        <td>
+          {code === null ? (
+            <strong>–</strong>
+          ) : (
+            <button
+              type="button"
+              className={own.toggle}
+              aria-expanded={shown}
+              aria-controls={shown ? id : undefined}
+              aria-label={t("page.aid.toggle", { code: errorCode(code) })}
+              title={t("page.entry.raw_only", { raw })}
+            >
+              <Chevron size={16} aria-hidden />
+              {errorCode(code)}
+            </button>
+          )}
+        </td>
+        <td>{code === null ? t("page.axis.entry_unread") : meaningOf(context.doc, code, t)}</td>
+        <td>{code === null ? "–" : reactionOf(context.doc, code, t)}</td>
+        <td>{entry.stamp ?? "–"}</td>
+      </tr>
+      {shown && (
+        <tr id={id} className={own.more}>
+          <td colSpan={4}>
+            <ErrorAid code={code} context={context} partner={partner} />
+          </td>
+        </tr>
+      )}
+    </tbody>
+  );
+}
+
 function meaningOf(doc: DescriptionDoc, code: number, t: Translate): string {
-  const error = doc.errors.find((one) => one.code === code);
-  return t(error ? error.text_key : "page.card.unknown_code");
+  return t(errorIn(doc, code)?.text_key ?? "page.card.unknown_code");
 }
 
 function reactionOf(doc: DescriptionDoc, code: number, t: Translate): string {
-  const reaction = doc.errors.find((one) => one.code === code)?.reaction ?? null;
+  const reaction = errorIn(doc, code)?.reaction ?? null;
   return reaction === null ? "–" : t(`reaction.${reaction}`);
 }
