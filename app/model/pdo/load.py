@@ -1,4 +1,4 @@
-"""What PDOs cost of the bus: frames a second, bits a frame, share of the bit rate. Estimates that name their grounds."""
+"""What PDOs cost of the bus: frames a second, bits a frame, share of the bit rate; each estimate names its grounds."""
 
 from __future__ import annotations
 

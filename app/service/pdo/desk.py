@@ -1,7 +1,7 @@
 """The desk at which PDOs are changed: preview, apply, put back. One change at a time, and while nothing moves.
 
-Any technician may: the objects are ``rw``, not the maker's ``r(w)`` that need an expert, what the rules call an error is
-refused, every write is in the audit log under the person's name, and one action puts all of it back.
+Any technician may: the objects are ``rw``, not the maker's ``r(w)`` that need an expert; what the rules call an error
+is refused, every write is in the audit log under the person's name, and one action puts all of it back.
 """
 
 from __future__ import annotations
