@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -31,7 +31,7 @@ from app.model.pdo.load import Basis
 from app.service.connection import Connection
 from app.service.gate import Block
 from app.service.jobs import JobState, RowState
-from app.service.journal import Kind
+from app.service.journal import Entry, Kind
 from app.service.motion.desk import MotionDesk
 from app.service.pdo.desk import Edit, PdoDesk, UndoStand, preview
 from app.service.pdo.look import is_operational, seen_on, setups_of, taken_by_others
@@ -41,7 +41,6 @@ from app.service.stop import Path as Way
 from app.service.write import write_raw
 from app.store.store import Store
 from app.twins.line import Fault, drop
-from app.wire.frame import Can
 from app.wire.records import Source
 from tests.model.pdo.rig import RPDO1, RPDO2, TPDO1, TPDO2, TPDO3, changed, disabled, enabled
 from tests.service.conftest import Served
@@ -163,29 +162,30 @@ async def test_a_change_that_is_cancelled_is_put_back_whole(person: Person) -> N
     assert person.desk.kept.of(AXIS) is None
 
 
-async def test_what_could_not_be_put_back_stays_open_and_is_put_back_later(served: Served, person: Person) -> None:
+async def test_what_could_not_be_put_back_stays_open_and_is_put_back_later(person: Person) -> None:
     before = await person.setups()
-    node = person.target.node
-    request = 0x600 + node
+    blocks, journal = person.connection.gate.blocks, person.connection.journal
 
-    def enables(data: bytes) -> bool:
-        return data[:3] == bytes([0x23, 0x01, 0x18])
+    def shut(entry: Entry) -> None:
+        """From the failed write on nothing may be written any more."""
+        if entry.kind is Kind.WRITE_FAILED:
+            blocks.put([Block("r1", "wtg-07/blade-1", ())])
 
-    gone = Fault(lambda can: can.can_id == 0x580 + node, drop, None)
-
-    def cut(can: Can) -> Sequence[tuple[int, Can]]:
-        served.line.inject(gone)
-        return drop(can)
-
-    served.spoil(Fault(lambda can: can.can_id == request and enables(can.data), cut))
-    job = await person.apply(enabled(before[TPDO2], "6064/32"))
+    end = journal.listen(shut)
+    job = await person.apply(with_cob_id(changed(before[TPDO2], "6064/32", event_ms=20), 0x60012345))
+    end()
     assert job.state is JobState.FAILED and isinstance(job.error, PdoBrokenError)
+    assert job.error.details["again_key"] == "page.pdo.why.held"
+    assert Kind.PDO_BROKEN in [entry.kind for entry in journal.latest()]
     assert person.desk.undo_stand(person.target) is UndoStand.OPEN
-    gone.times = 0
-    assert (await person.setups())[TPDO2] != before[TPDO2]
+    assert (await person.setups())[TPDO2].parameters.event_ms == 20
+    with pytest.raises(RestoreOpenError):
+        await person.undo()
+    blocks.put([])
     undone = await person.undo()
     assert (undone.state, undone.error) == (JobState.DONE, None)
     assert await person.setups() == before
+    assert person.desk.undo_stand(person.target) is None
 
 
 async def test_a_change_can_be_put_back_after_the_server_was_started_anew(
