@@ -68,17 +68,28 @@ export function PdoReview(props: Props) {
 }
 
 const hex = (raw: number) => `${raw.toString(HEX).toUpperCase()}h`;
+/** Identifiers and mapped objects are known by their hexadecimal form; numbers and times are numbers. */
+const IN_HEX: readonly string[] = ["disable", "map", "enable", "cob_id"];
+const PARAMETERS: Readonly<Record<string, string>> = {
+  "02": "transmission",
+  "03": "inhibit",
+  "05": "event",
+  "06": "sync_start",
+};
 
 function Write({ write }: { write: PdoWrite }) {
   const t = useTexts();
+  const value = IN_HEX.includes(write.step) ? hex : String;
+  const parameter = write.step === "parameter" ? PARAMETERS[write.address.slice(-2)] : undefined;
+  const step = t(`page.pdo.step.${write.step}`);
   return (
     <li>
       <span>{write.pdo}</span>
       <span className={classes.address}>{write.address}</span>
-      <span>{t(`page.pdo.step.${write.step}`)}</span>
+      <span>{parameter === undefined ? step : `${t(`page.pdo.${parameter}`)}: ${step}`}</span>
       <span>
-        <span className="dim">{write.was_raw === null ? "–" : hex(write.was_raw)}</span> →{" "}
-        <b>{hex(write.raw)}</b>
+        <span className="dim">{write.was_raw === null ? "–" : value(write.was_raw)}</span> →{" "}
+        <b>{value(write.raw)}</b>
       </span>
     </li>
   );
