@@ -50,7 +50,7 @@ def entries(page: Page) -> list[str]:
 
 
 def test_an_object_is_mapped_seen_on_the_bus_and_taken_out_again(context: BrowserContext, demo: str) -> None:
-    page = pdo_page(context, demo)
+    page = pdo_page(context, demo, "&events=open&eventq=socketcand")
     row = page.get_by_test_id("pdo-tpdo2")
     expect(row).to_have_attribute("data-enabled", "false")
     command(page, NmtCommand.START)
