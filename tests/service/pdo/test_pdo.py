@@ -66,7 +66,7 @@ def witness(served: Served, node: int) -> Iterator[canopen.RemoteNode]:
     """The device as another CANopen library reads it."""
     network = canopen.Network()
     network.connect(interface="socketcand", host="127.0.0.1", port=served.server.port, channel="can0")
-    remote = canopen.RemoteNode(node, canopen.ObjectDictionary())
+    remote = canopen.RemoteNode(node, canopen.ObjectDictionary())  # type: ignore[no-untyped-call]
     remote.sdo.RESPONSE_TIMEOUT = 5.0
     network.add_node(remote)
     try:
