@@ -80,7 +80,8 @@ async def test_what_cannot_be_is_refused_with_its_reason(server: Server) -> None
     edit = await tpdo2(server, cob_id=0x40000581)
     answer = await server.client.post(f"{PATH}/pdos/apply", json={"page": PAGE, "edits": [edit]})
     assert (answer.status_code, answer.json()["code"]) == (422, "pdo_refused")
-    assert "581h is reserved" in answer.json()["detail"]
+    details = answer.json()["details"]
+    assert (details["pdo"], details["reason_key"], details["id"]) == ("TPDO2", "page.pdo.finding.restricted", "581h")
     other = {**edit, "base": {**edit["base"], "event_ms": 7}}
     for path in ("apply", "preview"):
         body = {"edits": [other], **({"page": PAGE} if path == "apply" else {})}
