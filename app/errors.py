@@ -71,6 +71,11 @@
     │   ├── InterlockError                  an interlock keeps the axis from moving; names it
     │   ├── AxisStateError                  the axis is in another state than the command wants
     │   ├── NotPreparedError                motion of the axis is not prepared
+    │   ├── PdoRefusedError                 PDOs cannot be set up so; says which one and why
+    │   ├── PdoUnknownError                 how a PDO is set up is not known: it was not read
+    │   ├── PdoChangedError                 a PDO is set up otherwise than when it was looked at
+    │   ├── PdoBusyError                    PDOs cannot be changed now; says why
+    │   ├── PdoNoUndoError                  no change of PDOs that could be put back
     │   ├── NoInstructorError               the connected turbine is none of the twins that we started
     │   └── FaultOrderError                 a fault that cannot be put into a twin so; names the field
     │       └── FaultValueError             one of its values is out of range; names the limits
@@ -83,6 +88,8 @@
     │   └── TwinsGoneError                  the twins that we started do not answer
     ├── UnverifiedError            exit 6   sent, but what was read back differs or could not be read
     ├── RestoreBrokenError         exit 6   a restore ended otherwise than ordered; says why
+    ├── PdoRolledBackError         exit 6   a change of PDOs failed; what stood before stands again, read back
+    ├── PdoBrokenError             exit 6   a change of PDOs failed, and could not be put back
     ├── RecordingError             exit 2   a recording is damaged or cannot be written
     └── ProtocolError              exit 4   bytes on the wire that no rule of the protocol allows
 
@@ -524,6 +531,36 @@ class NotPreparedError(RefusedError):
     code = "not_prepared"
 
 
+class PdoRefusedError(RefusedError):
+    """PDOs cannot be set up so. Details: device, pdo, reason_key (a finding's text key) and what fills it."""
+
+    code = "pdo_refused"
+
+
+class PdoUnknownError(RefusedError):
+    """How a PDO is set up is not known: its objects were not read, or hold no PDO. Details: device, pdo."""
+
+    code = "pdo_unknown"
+
+
+class PdoChangedError(RefusedError):
+    """A PDO is set up otherwise than when it was looked at; nothing was written. Details: device, pdo."""
+
+    code = "pdo_changed"
+
+
+class PdoBusyError(RefusedError):
+    """PDOs of a device cannot be changed now. Details: device, reason_key."""
+
+    code = "pdo_busy"
+
+
+class PdoNoUndoError(RefusedError):
+    """There is no change of PDOs that could be put back. Details: device."""
+
+    code = "pdo_no_undo"
+
+
 class NoInstructorError(RefusedError):
     """Faults go only into twins that this server has started, and the connected turbine is none of them."""
 
@@ -605,6 +642,20 @@ class RestoreBrokenError(HubsideError):
     """A restore ended otherwise than ordered. Details: station, device, cause_key (a text key), end_key."""
 
     code = "restore_broken"
+    exit_code = 6
+
+
+class PdoRolledBackError(HubsideError):
+    """A change of PDOs failed; what stood before stands again and was read back. Details: device, reason_key."""
+
+    code = "pdo_rolled_back"
+    exit_code = 6
+
+
+class PdoBrokenError(HubsideError):
+    """A change of PDOs failed, and what stood before could not be put back. Details: device, reason_key, again_key."""
+
+    code = "pdo_broken"
     exit_code = 6
 
 

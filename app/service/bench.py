@@ -22,6 +22,7 @@ from app.service.motion.desk import MotionDesk
 from app.service.motion.left import Left
 from app.service.office.office import Office
 from app.service.options import Options
+from app.service.pdo.desk import PdoDesk
 from app.service.poll import Poller
 from app.service.polling import Polling
 from app.service.recording_list import Recordings, samples_folder
@@ -76,6 +77,7 @@ class Bench:
         self.connection: Connection | None = None
         self.motion: MotionDesk | None = None
         self._left = Left(self.office.store)
+        self.pdos = PdoDesk(self.office.store, self.stamper)
         self.twins: TwinWatch | None = None
         self.epoch = 0
         self.indexing = Indexing(None if options.data is None else options.data / "indexes")

@@ -62,6 +62,10 @@ class Kind(Enum):
     RESTORE_ROLLED_BACK = "restore_rolled_back"
     RESTORE_INCOMPLETE = "restore_incomplete"
     RESTORE_GIVEN_UP = "restore_given_up"
+    PDO_CHANGED = "pdo_changed"
+    PDO_PUT_BACK = "pdo_put_back"
+    PDO_ROLLED_BACK = "pdo_rolled_back"
+    PDO_BROKEN = "pdo_broken"
 
     @property
     def severity(self) -> Severity:
@@ -82,6 +86,7 @@ _ERRORS: Final = (
     Kind.RECORDING_LOST,
     Kind.STORE_FAILED,
     Kind.RESTORE_INCOMPLETE,
+    Kind.PDO_BROKEN,
 )
 _WARNINGS: Final = (
     Kind.MOTION_STOPPED,
@@ -92,6 +97,9 @@ _WARNINGS: Final = (
     Kind.RESTORE_RESUMED,
     Kind.RESTORE_ROLLED_BACK,
     Kind.RESTORE_GIVEN_UP,
+    Kind.PDO_CHANGED,
+    Kind.PDO_PUT_BACK,
+    Kind.PDO_ROLLED_BACK,
     Kind.OTHER_MASTER,
     Kind.CONSENT,
     Kind.RECORDING_STOPPED,
@@ -116,6 +124,10 @@ _DONE: Final = (
     Kind.RESTORE_TURNED_BACK,
     Kind.RESTORE_RESUMED,
     Kind.RESTORE_GIVEN_UP,
+    Kind.PDO_CHANGED,
+    Kind.PDO_PUT_BACK,
+    Kind.PDO_ROLLED_BACK,
+    Kind.PDO_BROKEN,
     Kind.CONNECTED,
     Kind.DISCONNECTED,
     Kind.CONSENT,

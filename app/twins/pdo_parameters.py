@@ -12,12 +12,11 @@ from typing import Final
 
 from app.model.address import Address
 from app.model.datatypes import DataType, Raw
+from app.model.pdo.identifiers import is_restricted
 from app.twins.object_store import Cell, ObjectStore, RefusedAccessError
 from app.wire import pdo
 from app.wire.sdo import Abort
 
-_RESTRICTED: Final = (range(0x000, 0x080), range(0x101, 0x181), range(0x581, 0x600), range(0x601, 0x680))
-_RESTRICTED_HIGH: Final = range(0x6E0, 0x800)
 _DUMMY_TYPES: Final = {kind.value: kind for kind in DataType if kind.value <= 7}
 _MAX_BITS: Final = 64
 
@@ -120,7 +119,7 @@ def _cob_guard(objects: PdoObjects) -> Callable[[Raw], None]:
         if not raw & pdo.COB_INVALID:
             if not old & pdo.COB_INVALID and raw != old:
                 raise RefusedAccessError(Abort.VALUE_RANGE)
-            if identifier in _RESTRICTED_HIGH or any(identifier in ids for ids in _RESTRICTED):
+            if is_restricted(identifier):
                 raise RefusedAccessError(Abort.VALUE_RANGE)
 
     return check

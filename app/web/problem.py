@@ -64,6 +64,10 @@ _STATUS: Final[tuple[tuple[type[HubsideError], HTTPStatus], ...]] = (
     (errors.AxisStateError, HTTPStatus.CONFLICT),
     (errors.NotPreparedError, HTTPStatus.CONFLICT),
     (errors.OvertakenError, HTTPStatus.CONFLICT),
+    (errors.PdoUnknownError, HTTPStatus.CONFLICT),
+    (errors.PdoChangedError, HTTPStatus.CONFLICT),
+    (errors.PdoBusyError, HTTPStatus.CONFLICT),
+    (errors.PdoNoUndoError, HTTPStatus.CONFLICT),
     (errors.RefusedError, HTTPStatus.UNPROCESSABLE_ENTITY),
     (errors.ColumnError, HTTPStatus.NOT_FOUND),
     (errors.StoreError, HTTPStatus.SERVICE_UNAVAILABLE),
@@ -77,6 +81,8 @@ _STATUS: Final[tuple[tuple[type[HubsideError], HTTPStatus], ...]] = (
     (errors.ProtocolError, HTTPStatus.BAD_GATEWAY),
     (errors.UnverifiedError, HTTPStatus.BAD_GATEWAY),
     (errors.RestoreBrokenError, HTTPStatus.BAD_GATEWAY),
+    (errors.PdoRolledBackError, HTTPStatus.BAD_GATEWAY),
+    (errors.PdoBrokenError, HTTPStatus.BAD_GATEWAY),
 )
 """The first that fits counts. 4xx: nothing was sent; 502 to 504: it was, and something on the bus went wrong."""
 

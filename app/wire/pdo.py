@@ -1,4 +1,4 @@
-"""Byte codec of PDOs and of the objects that configure them (CiA 301, 7.2.2 and 7.5.2.33 ff). Pure.
+"""Byte codec of PDOs (CiA 301, 7.2.2). Pure; what configures them is in ``app.model.pdo``.
 
 The first mapped entry is in the lowest bits of the frame; every entry is least significant byte first.
 """
@@ -8,54 +8,21 @@ from __future__ import annotations
 from collections.abc import Mapping as MappingOf
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 from app.model.address import Address
-
-RPDO_COMMUNICATION: Final = 0x1400
-RPDO_MAPPING: Final = 0x1600
-TPDO_COMMUNICATION: Final = 0x1800
-TPDO_MAPPING: Final = 0x1A00
-PDO_COUNT: Final = 512
-
-COB_INVALID: Final = 0x80000000
-COB_NO_RTR: Final = 0x40000000
-COB_EXTENDED: Final = 0x20000000
-MAX_DUMMY_INDEX: Final = 0x001F
-"""Up to here an index in a mapping is a data type: bits that nobody reads (7.4.7)."""
-
-
-class PdoParameters(NamedTuple):
-    """Communication parameters (14xxh, 18xxh). ``cob_id`` is the raw UNSIGNED32 of sub-index 1.
-
-    ``inhibit_100us`` is sub-index 3, ``event_ms`` sub-index 5, ``sync_start`` sub-index 6.
-    """
-
-    cob_id: int
-    transmission_type: int = 255
-    inhibit_100us: int = 0
-    event_ms: int = 0
-    sync_start: int = 0
-
-    @property
-    def valid(self) -> bool:
-        """True where the PDO exists: bit 31 of the COB-ID is 0."""
-        return not self.cob_id & COB_INVALID
-
-    @property
-    def rtr_allowed(self) -> bool:
-        """True where a TPDO may be asked for by a remote frame: bit 30 is 0."""
-        return not self.cob_id & COB_NO_RTR
-
-    @property
-    def extended(self) -> bool:
-        """True where it has a 29-bit identifier."""
-        return bool(self.cob_id & COB_EXTENDED)
-
-    @property
-    def can_id(self) -> int:
-        """The CAN identifier."""
-        return self.cob_id & (0x1FFFFFFF if self.extended else 0x7FF)
+from app.model.pdo.objects import COB_EXTENDED as COB_EXTENDED
+from app.model.pdo.objects import COB_INVALID as COB_INVALID
+from app.model.pdo.objects import COB_NO_RTR as COB_NO_RTR
+from app.model.pdo.objects import MAX_DUMMY_INDEX as MAX_DUMMY_INDEX
+from app.model.pdo.objects import PDO_COUNT as PDO_COUNT
+from app.model.pdo.objects import RPDO_COMMUNICATION as RPDO_COMMUNICATION
+from app.model.pdo.objects import RPDO_MAPPING as RPDO_MAPPING
+from app.model.pdo.objects import TPDO_COMMUNICATION as TPDO_COMMUNICATION
+from app.model.pdo.objects import TPDO_MAPPING as TPDO_MAPPING
+from app.model.pdo.objects import PdoParameters as PdoParameters
+from app.model.pdo.objects import mapping_entry as mapping_entry
+from app.model.pdo.objects import parse_mapping_entry as parse_mapping_entry
 
 
 class Slot(NamedTuple):
@@ -93,18 +60,6 @@ class Mapping:
                 slots.append(Slot(address, position // 8, (position + bits) // 8))
             position += bits
         return tuple(slots)
-
-
-def mapping_entry(address: Address, bits: int) -> int:
-    """The UNSIGNED32 of 16xxh and 1Axxh: index, sub-index, width. Raises ValueError where the width is not 1..64."""
-    if not 1 <= bits <= 64:
-        raise ValueError(f"{bits} bits cannot be mapped")
-    return address.major << 16 | address.minor << 8 | bits
-
-
-def parse_mapping_entry(raw: int) -> tuple[Address, int]:
-    """Read an UNSIGNED32 of 16xxh or 1Axxh: the address and its width in bits."""
-    return Address(raw >> 16 & 0xFFFF, raw >> 8 & 0xFF), raw & 0xFF
 
 
 def pack(mapping: Mapping, values: MappingOf[Address, bytes]) -> bytes:

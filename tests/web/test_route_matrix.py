@@ -52,6 +52,12 @@ ROUTES: Final[dict[tuple[str, str], Role]] = {
     ("POST", "/api/live/disconnect"): TECHNICIAN,
     ("POST", "/api/live/consent"): TECHNICIAN,
     ("GET", "/api/live/turbine"): VIEWER,
+    # PDOs of a device
+    ("GET", "/api/live/devices/{turbine}/{station}/{device}/pdos"): VIEWER,
+    ("GET", "/api/replay/{replay_id}/devices/{turbine}/{station}/{device}/pdos"): VIEWER,
+    ("POST", "/api/live/devices/{turbine}/{station}/{device}/pdos/preview"): TECHNICIAN,
+    ("POST", "/api/live/devices/{turbine}/{station}/{device}/pdos/apply"): TECHNICIAN,
+    ("POST", "/api/live/devices/{turbine}/{station}/{device}/pdos/undo"): TECHNICIAN,
     # who moves the axes
     ("GET", "/api/live/motion"): VIEWER,
     ("POST", "/api/live/motion/lease"): TECHNICIAN,

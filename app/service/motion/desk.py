@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Awaitable, Callable
-from contextlib import suppress
+from collections.abc import Awaitable, Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from enum import Enum
 from time import monotonic
@@ -20,11 +20,13 @@ from app.drivers.contract import LinkState
 from app.errors import (
     HubsideError,
     InterlockError,
+    LeaseHeldError,
     NotConnectedError,
     NotHeldError,
     NotPreparedError,
     OldOrderError,
     OvertakenError,
+    PdoBusyError,
     UsageError,
 )
 from app.model.axis_state import AxisState
@@ -137,6 +139,7 @@ class MotionDesk:
         self._journal = journal
         self.now_s = now_s
         self.now_ns = connection.stamper
+        self._kept_still: str | None = None
         self._order = 0
         self._closed = False
         self._heartbeats = {
@@ -445,6 +448,28 @@ class MotionDesk:
             except HubsideError as error:
                 log.warning("%s: what was prepared is not put back: %s", axis.slug, error.code)
 
+    @contextmanager
+    def kept_still(self, slug: str, page: str) -> Iterator[None]:
+        """Nothing is begun at any axis meanwhile: what commands go by is changed in the device ``slug``.
+
+        STOP and FEATHER go as ever. Raises LeaseHeldError where another page than ``page`` has the lease, PdoBusyError
+        where an axis is under way, or the device is prepared or already kept still.
+        """
+        holder = self.lease.holder
+        if holder is not None and holder.page != page:
+            raise LeaseHeldError(holder=holder.person)
+        if self._kept_still is not None:
+            raise PdoBusyError(device=slug, reason_key="page.pdo.busy.changing")
+        if self.running is not None:
+            raise PdoBusyError(device=slug, reason_key="page.pdo.busy.moving")
+        if slug in self.prepared:
+            raise PdoBusyError(device=slug, reason_key="page.pdo.busy.prepared")
+        self._kept_still = slug
+        try:
+            yield
+        finally:
+            self._kept_still = None
+
     # -- motion ---------------------------------------------------------------------------------
 
     async def halt(self, slug: str, fence: int) -> None:
@@ -536,6 +561,8 @@ class MotionDesk:
             raise NotConnectedError
         if self.running is not None:
             raise InterlockError(device=self.running.slug, interlock="running", reason=self.running.doing.value)
+        if self._kept_still is not None:
+            raise InterlockError(device=self._kept_still, interlock="running", reason="PDO")
 
     async def _is_held(self, order: int) -> bool:
         """Whether it is held. An order may be ahead of the beat that was sent before it, on another connection."""

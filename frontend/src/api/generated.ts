@@ -974,6 +974,86 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/live/devices/{turbine}/{station}/{device}/pdos": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Device Pdos
+         * @description How the PDOs of a device are set up, as far as the wire has told; nothing is sent.
+         */
+        get: operations["device_pdos"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/live/devices/{turbine}/{station}/{device}/pdos/apply": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Apply Pdos
+         * @description Write an edit in the background: all of it, or, where anything fails, what stood before stands again.
+         */
+        post: operations["apply_pdos"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/live/devices/{turbine}/{station}/{device}/pdos/preview": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Preview Pdos
+         * @description What an edit would do: findings, the writes in their order, and the load of the bus. Nothing is sent.
+         */
+        post: operations["preview_pdos"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/live/devices/{turbine}/{station}/{device}/pdos/undo": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Undo Pdos
+         * @description Put the last change of the device back, in the background.
+         */
+        post: operations["undo_pdos"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/live/devices/{turbine}/{station}/{device}/read": {
         parameters: {
             query?: never;
@@ -2384,6 +2464,26 @@ export interface paths {
          * @description Everything that is known of a device's objects.
          */
         get: operations["replay_description"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/replay/{replay_id}/devices/{turbine}/{station}/{device}/pdos": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Replay Device Pdos
+         * @description How the PDOs of a device are set up, as far as the wire has told; nothing is sent.
+         */
+        get: operations["replay_device_pdos"];
         put?: never;
         post?: never;
         delete?: never;
@@ -6331,6 +6431,348 @@ export interface components {
             name: string;
             /** Without */
             without: number[];
+        };
+        /**
+         * PdoApply
+         * @description As ``PdoEdits``; ``page`` is the name of the page that asks, as for the lease.
+         * @example {
+         *       "edits": [
+         *         {
+         *           "base": {
+         *             "cob_id": 1073742208,
+         *             "event_ms": 0,
+         *             "inhibit_100us": 0,
+         *             "mapped": [
+         *               {
+         *                 "bits": 16,
+         *                 "object": "6041"
+         *               }
+         *             ],
+         *             "sync_start": 0,
+         *             "transmission_type": 255
+         *           },
+         *           "direction": "tpdo",
+         *           "number": 1,
+         *           "wanted": {
+         *             "cob_id": 1073742208,
+         *             "event_ms": 100,
+         *             "inhibit_100us": 0,
+         *             "mapped": [
+         *               {
+         *                 "bits": 16,
+         *                 "object": "6041"
+         *               }
+         *             ],
+         *             "sync_start": 0,
+         *             "transmission_type": 255
+         *           }
+         *         }
+         *       ],
+         *       "page": "5f2c1d"
+         *     }
+         */
+        PdoApply: {
+            /** Edits */
+            edits: components["schemas"]["PdoEdit"][];
+            /** Page */
+            page: string;
+        };
+        /**
+         * PdoCost
+         * @description Shares of the bit rate, 0..1. ``bus_now`` is measured, all traffic; the rest are estimates for operational nodes.
+         *
+         *     ``over``: the bus would be busier than the poller may make it ("cap"), or than is sound ("share"); None: neither.
+         */
+        PdoCost: {
+            /** Bus After */
+            bus_after: number;
+            /** Bus Now */
+            bus_now: number;
+            /** Cap */
+            cap: number;
+            /** Over */
+            over: ("cap" | "share") | null;
+            /** Pdos After */
+            pdos_after: number;
+            /** Pdos Now */
+            pdos_now: number;
+            /** Rows */
+            rows: components["schemas"]["PdoCostRow"][];
+        };
+        /**
+         * PdoCostRow
+         * @description What one PDO of the bus costs now, and would after the change; None where it is not known.
+         */
+        PdoCostRow: {
+            after: components["schemas"]["PdoLoadDoc"];
+            /** Device */
+            device: string;
+            /**
+             * Direction
+             * @enum {string}
+             */
+            direction: "rpdo" | "tpdo";
+            now: components["schemas"]["PdoLoadDoc"];
+            /** Number */
+            number: number;
+        };
+        /**
+         * PdoDoc
+         * @description A PDO of a device: ``subs`` are the communication parameters that it has, ``room`` is for so many objects.
+         *
+         *     ``setup`` None: not read since the device started. ``seen_t_ns`` and ``per_second`` are of its frame on the bus.
+         */
+        PdoDoc: {
+            /**
+             * Direction
+             * @enum {string}
+             */
+            direction: "rpdo" | "tpdo";
+            load: components["schemas"]["PdoLoadDoc"] | null;
+            /** Number */
+            number: number;
+            /** Per Second */
+            per_second: number | null;
+            /** Room */
+            room: number;
+            /** Seen T Ns */
+            seen_t_ns: number | null;
+            setup: components["schemas"]["PdoSetupDoc"] | null;
+            /** Stop Path */
+            stop_path: boolean;
+            /** Subs */
+            subs: number[];
+        };
+        /**
+         * PdoEdit
+         * @description A PDO as a person wants it; ``base`` is how it was set up when the edit began.
+         */
+        PdoEdit: {
+            base: components["schemas"]["PdoSetupDoc"];
+            /**
+             * Direction
+             * @enum {string}
+             */
+            direction: "rpdo" | "tpdo";
+            /** Number */
+            number: number;
+            wanted: components["schemas"]["PdoSetupDoc"];
+        };
+        /**
+         * PdoEdits
+         * @description What is to be changed in one device.
+         * @example {
+         *       "edits": [
+         *         {
+         *           "base": {
+         *             "cob_id": 1073742208,
+         *             "event_ms": 0,
+         *             "inhibit_100us": 0,
+         *             "mapped": [
+         *               {
+         *                 "bits": 16,
+         *                 "object": "6041"
+         *               }
+         *             ],
+         *             "sync_start": 0,
+         *             "transmission_type": 255
+         *           },
+         *           "direction": "tpdo",
+         *           "number": 1,
+         *           "wanted": {
+         *             "cob_id": 1073742208,
+         *             "event_ms": 100,
+         *             "inhibit_100us": 0,
+         *             "mapped": [
+         *               {
+         *                 "bits": 16,
+         *                 "object": "6041"
+         *               }
+         *             ],
+         *             "sync_start": 0,
+         *             "transmission_type": 255
+         *           }
+         *         }
+         *       ]
+         *     }
+         */
+        PdoEdits: {
+            /** Edits */
+            edits: components["schemas"]["PdoEdit"][];
+        };
+        /**
+         * PdoFinding
+         * @description What is wrong, or worth a thought. ``code`` ends its text key; ``entry`` counts mapped objects from 1.
+         */
+        PdoFinding: {
+            /** Code */
+            code: string;
+            /** Details */
+            details: {
+                [key: string]: string | number;
+            };
+            /**
+             * Direction
+             * @enum {string}
+             */
+            direction: "rpdo" | "tpdo";
+            /** Entry */
+            entry: number | null;
+            /** Number */
+            number: number;
+            /**
+             * Part
+             * @enum {string}
+             */
+            part: "cob_id" | "type" | "inhibit" | "event" | "sync_start" | "mapping";
+            /**
+             * Severity
+             * @enum {string}
+             */
+            severity: "error" | "warning" | "note";
+        };
+        /**
+         * PdoLoadDoc
+         * @description What a PDO costs: frames a second, bits of its longest frame, share of the bit rate (0..1).
+         *
+         *     ``basis`` ends the text key that says what the rate rests on; ``certain`` false: it is a bound or a guess.
+         */
+        PdoLoadDoc: {
+            /** Basis */
+            basis: string;
+            /** Bits */
+            bits: number;
+            /** Certain */
+            certain: boolean;
+            /** Per Second */
+            per_second: number;
+            /** Share */
+            share: number;
+        };
+        /**
+         * PdoMappable
+         * @description An object that may be mapped, and into which PDOs.
+         */
+        PdoMappable: {
+            /** Bits */
+            bits: number;
+            /** Object */
+            object: string;
+            /** Rpdo */
+            rpdo: boolean;
+            /** Tpdo */
+            tpdo: boolean;
+        };
+        /**
+         * PdoMapped
+         * @description One mapped object; up to 001F a data type that only fills bits.
+         */
+        PdoMapped: {
+            /** Bits */
+            bits: number;
+            /** Object */
+            object: string;
+        };
+        /**
+         * PdoPreview
+         * @description What an edit would do: nothing was sent.
+         */
+        PdoPreview: {
+            cost: components["schemas"]["PdoCost"];
+            /** Findings */
+            findings: components["schemas"]["PdoFinding"][];
+            /** Writes */
+            writes: components["schemas"]["PdoWriteDoc"][];
+        };
+        /**
+         * PdoSetupDoc
+         * @description How a PDO is set up; ``cob_id`` with its bits 29 to 31. Parameters that the device does not have are 0.
+         */
+        PdoSetupDoc: {
+            /** Cob Id */
+            cob_id: number;
+            /** Event Ms */
+            event_ms: number;
+            /** Inhibit 100Us */
+            inhibit_100us: number;
+            /** Mapped */
+            mapped: components["schemas"]["PdoMapped"][];
+            /** Sync Start */
+            sync_start: number;
+            /** Transmission Type */
+            transmission_type: number;
+        };
+        /**
+         * PdoUndo
+         * @description The last change of the device; ``stand`` says whether it can be put back.
+         */
+        PdoUndo: {
+            /** Pdos */
+            pdos: string[];
+            /** Person */
+            person: string;
+            /**
+             * Stand
+             * @enum {string}
+             */
+            stand: "ready" | "open" | "gone" | "unknown";
+            /** T Ns */
+            t_ns: number;
+        };
+        /**
+         * PdoUndoRequest
+         * @description The page that asks.
+         * @example {
+         *       "page": "5f2c1d"
+         *     }
+         */
+        PdoUndoRequest: {
+            /** Page */
+            page: string;
+        };
+        /**
+         * PdoWriteDoc
+         * @description One write, in its order. ``step`` ends a text key; ``was_raw`` None: what stands there is not known.
+         */
+        PdoWriteDoc: {
+            /** Address */
+            address: string;
+            /** Pdo */
+            pdo: string;
+            /** Raw */
+            raw: number;
+            /** Step */
+            step: string;
+            /** Was Raw */
+            was_raw: number | null;
+        };
+        /**
+         * PdosDoc
+         * @description All PDOs of a device as the wire has told them.
+         *
+         *     ``operational`` None: not known; else whether PDOs are sent and taken now. ``unread``: objects that must be read.
+         *     ``keeps``: the device keeps PDOs over a restart once they are saved.
+         */
+        PdosDoc: {
+            /** Bitrate */
+            bitrate: number;
+            /** Bus Load */
+            bus_load: number;
+            /** Device */
+            device: string;
+            /** Keeps */
+            keeps: boolean;
+            /** Mappable */
+            mappable: components["schemas"]["PdoMappable"][];
+            /** Operational */
+            operational: boolean | null;
+            /** Pdos */
+            pdos: components["schemas"]["PdoDoc"][];
+            /** Sync Per Second */
+            sync_per_second: number | null;
+            undo: components["schemas"]["PdoUndo"] | null;
+            /** Unread */
+            unread: string[];
         };
         /**
          * PlaceDoc
@@ -13078,6 +13520,471 @@ export interface operations {
             };
         };
     };
+    device_pdos: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                turbine: string;
+                station: string;
+                device: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["PdosDoc"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    apply_pdos: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                turbine: string;
+                station: string;
+                device: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "edits": [
+                 *         {
+                 *           "base": {
+                 *             "cob_id": 1073742208,
+                 *             "event_ms": 0,
+                 *             "inhibit_100us": 0,
+                 *             "mapped": [
+                 *               {
+                 *                 "bits": 16,
+                 *                 "object": "6041"
+                 *               }
+                 *             ],
+                 *             "sync_start": 0,
+                 *             "transmission_type": 255
+                 *           },
+                 *           "direction": "tpdo",
+                 *           "number": 1,
+                 *           "wanted": {
+                 *             "cob_id": 1073742208,
+                 *             "event_ms": 100,
+                 *             "inhibit_100us": 0,
+                 *             "mapped": [
+                 *               {
+                 *                 "bits": 16,
+                 *                 "object": "6041"
+                 *               }
+                 *             ],
+                 *             "sync_start": 0,
+                 *             "transmission_type": 255
+                 *           }
+                 *         }
+                 *       ],
+                 *       "page": "5f2c1d"
+                 *     }
+                 */
+                "application/json": components["schemas"]["PdoApply"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["JobDoc"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Conflict */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Bad Gateway */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Service Unavailable */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Gateway Timeout */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    preview_pdos: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                turbine: string;
+                station: string;
+                device: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "edits": [
+                 *         {
+                 *           "base": {
+                 *             "cob_id": 1073742208,
+                 *             "event_ms": 0,
+                 *             "inhibit_100us": 0,
+                 *             "mapped": [
+                 *               {
+                 *                 "bits": 16,
+                 *                 "object": "6041"
+                 *               }
+                 *             ],
+                 *             "sync_start": 0,
+                 *             "transmission_type": 255
+                 *           },
+                 *           "direction": "tpdo",
+                 *           "number": 1,
+                 *           "wanted": {
+                 *             "cob_id": 1073742208,
+                 *             "event_ms": 100,
+                 *             "inhibit_100us": 0,
+                 *             "mapped": [
+                 *               {
+                 *                 "bits": 16,
+                 *                 "object": "6041"
+                 *               }
+                 *             ],
+                 *             "sync_start": 0,
+                 *             "transmission_type": 255
+                 *           }
+                 *         }
+                 *       ]
+                 *     }
+                 */
+                "application/json": components["schemas"]["PdoEdits"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["PdoPreview"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Conflict */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Bad Gateway */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Service Unavailable */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Gateway Timeout */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    undo_pdos: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                turbine: string;
+                station: string;
+                device: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "page": "5f2c1d"
+                 *     }
+                 */
+                "application/json": components["schemas"]["PdoUndoRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["JobDoc"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Conflict */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Bad Gateway */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Service Unavailable */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Gateway Timeout */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
     read: {
         parameters: {
             query?: never;
@@ -18319,6 +19226,67 @@ export interface operations {
                     "application/json": {
                         [key: string]: unknown;
                     };
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    replay_device_pdos: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                turbine: string;
+                station: string;
+                device: string;
+                replay_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["PdosDoc"];
                 };
             };
             /** @description Unauthorized */

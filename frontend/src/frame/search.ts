@@ -42,6 +42,8 @@ export interface PageSearch {
   span?: string;
   /** The picture of the setting up that is open. */
   picture?: string;
+  /** The PDO that is open to be changed. */
+  pdo?: string;
   /** Name of the recording or set that is open. */
   file?: string;
   /** Filter, order (column, minus sign where descending) and hidden columns of the tables of files, sets and the bus. */
@@ -120,6 +122,7 @@ const TEXTS = [
   "camera",
   "span",
   "picture",
+  "pdo",
   "file",
   "find",
   "order",

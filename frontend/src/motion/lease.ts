@@ -7,7 +7,7 @@ import { liveStore, sendBeat, useHearing, useMotion } from "../live/live";
 import { Holding } from "./holding";
 
 /** A name that this page has until it is loaded anew: a copy of the tab is another page. */
-const PAGE = [...crypto.getRandomValues(new Uint8Array(8))]
+export const PAGE = [...crypto.getRandomValues(new Uint8Array(8))]
   .map((octet) => octet.toString(16).padStart(2, "0"))
   .join("");
 

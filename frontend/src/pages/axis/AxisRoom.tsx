@@ -6,10 +6,11 @@ import { TabbedRoom } from "../../ui/TabbedRoom";
 const TABS = {
   move: lazy(async () => ({ default: (await import("./AxisPage")).AxisPage })),
   setup: lazy(async () => ({ default: (await import("./setup/SetupTab")).SetupTab })),
+  pdo: lazy(async () => ({ default: (await import("./pdo/PdoTab")).PdoTab })),
 };
 
 /** What belongs to one tab. */
-const OWN = ["span", "picture"] as const;
+const OWN = ["span", "picture", "pdo"] as const;
 
 /** One axis: what it does and what moves it, what sets it up, and what measures it. */
 export function AxisRoom() {
