@@ -105,6 +105,83 @@ def test_a_blade_is_moved_as_long_as_the_button_is_held(context: BrowserContext,
     page.close()
 
 
+def state(page: Page, name: str) -> None:
+    expect(page.get_by_test_id("state-diagram")).to_have_attribute("data-state", re.compile(name), timeout=MOVE_MS)
+
+
+def out_of_feather(page: Page, by_deg: float) -> None:
+    start = stands_still(page)
+    press(page, "jog-minus")
+    page.wait_for_function(
+        "to => parseFloat(document.querySelector('[data-testid=axis-angle]').textContent) < to",
+        arg=start - by_deg,
+        timeout=MOVE_MS,
+    )
+    page.mouse.up()
+    stands_still(page)
+
+
+def test_an_axis_is_enabled_tried_stopped_and_its_fault_reset(context: BrowserContext, demo: str) -> None:
+    page, other = axis_page(context, demo, 2), axis_page(context, demo, 2)
+    take_control(page)
+    prepare(page)
+    press(page, "hold")
+    state(page, "operation_enabled")
+    expect(page.get_by_test_id("allowed-commands")).to_contain_text("Quick stop")
+    page.mouse.up()
+    expect(page.get_by_test_id("motion-ended")).to_contain_text("Enabled and standing: let go")
+    expect(page.get_by_test_id("allowed-commands")).not_to_contain_text("Quick stop")
+
+    out_of_feather(page, 5)
+    press(page, "try-feather")
+    expect(page.get_by_test_id("feather-result")).to_contain_text("(target 90.00°)", timeout=MOVE_MS)
+    page.mouse.up()
+    assert abs(stands_still(page) - 90) < 0.5
+    out_of_feather(page, 2)
+    press(page, "brake-test")
+    expect(page.get_by_test_id("brake-result")).to_have_attribute("data-verdict", "holds", timeout=MOVE_MS)
+    page.mouse.up()
+
+    press(page, "hold")
+    state(other, "operation_enabled")
+    expect(other.get_by_test_id("halt")).to_be_disabled()
+    other.get_by_test_id("quick-stop").click()  # without control of the axes
+    expect(page.get_by_test_id("motion-ended")).to_contain_text("stopped by the drive, or by STOP")
+    page.mouse.up()
+    other.close()
+
+    page.get_by_test_id("put-back").click()
+    expect(page.get_by_test_id("prepare")).to_be_visible()
+    faults = f"{demo.split('?')[0]}api/instructor/faults"
+    assert context.request.post(faults, data={"kind": "encoder_data", "blade": 2, "values": {}}).ok
+    state(page, "^fault$")
+    assert context.request.delete(faults).ok
+    page.get_by_test_id("reset-fault").click()
+    state(page, "ready_to_switch_on|switch_on_disabled")
+    give_back(page)
+    page.close()
+
+
+def test_a_move_beyond_the_limits_is_seen_before_and_refused(context: BrowserContext, demo: str) -> None:
+    page = axis_page(context, demo, 1)
+    preview = page.get_by_test_id("preview")
+    page.get_by_test_id("angle").fill("60")
+    expect(preview).to_contain_text(re.compile(r"\d+\.\d s: "))
+    expect(preview).to_have_attribute("data-beyond", "false")
+    page.get_by_test_id("angle").fill("361")
+    expect(preview).to_have_attribute("data-beyond", "true")
+    expect(preview).to_contain_text("it is refused")
+    take_control(page)
+    prepare(page)
+    before = stands_still(page)
+    press(page, "move-to")
+    expect(page.get_by_test_id("problem")).to_contain_text("361")
+    page.mouse.up()
+    assert abs(stands_still(page) - before) < 0.1
+    give_back(page)
+    page.close()
+
+
 def test_a_tab_that_is_killed_stops_its_blade(context: BrowserContext, demo: str) -> None:
     page, other = axis_page(context, demo, 2), axis_page(context, demo, 2)
     take_control(page)

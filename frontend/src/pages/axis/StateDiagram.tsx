@@ -82,7 +82,16 @@ export function StateDiagram({ state, stale }: { state: string | null; stale: bo
 
 function Head({ id, colour }: { id: string; colour: string }) {
   return (
-    <marker id={id} viewBox="0 0 8 8" refX="6" refY="4" markerWidth="7" markerHeight="7" orient="auto">
+    <marker
+      id={id}
+      viewBox="0 0 8 8"
+      refX="6"
+      refY="4"
+      markerWidth="9"
+      markerHeight="9"
+      markerUnits="userSpaceOnUse"
+      orient="auto"
+    >
       <path d="M0 0 L8 4 L0 8 z" fill={colour} />
     </marker>
   );
