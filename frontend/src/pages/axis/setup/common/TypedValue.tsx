@@ -11,7 +11,8 @@ import { stopText } from "./stopText";
 interface Props {
   parameter: Parameter;
   name: string;
-  label: string;
+  /** None where its row has the name already. */
+  label?: string;
   bounds: Bounds;
 }
 
@@ -35,7 +36,7 @@ export function TypedValue({ parameter, name, label, bounds }: Props) {
   return (
     <TextInput
       className={classes.typed ?? ""}
-      label={`${label}${change ? " ✎" : ""}`}
+      label={label === undefined ? undefined : `${label}${change ? " ✎" : ""}`}
       aria-label={name}
       value={typed ?? startText(entry, raw, context)}
       placeholder="–"
@@ -43,7 +44,7 @@ export function TypedValue({ parameter, name, label, bounds }: Props) {
       disabled={lock !== null || (raw === null && typed === null)}
       inputMode="decimal"
       rightSection={<span className={classes.unit}>{unit}</span>}
-      rightSectionWidth={34}
+      rightSectionWidth={28}
       onChange={(event) => setTyped(event.currentTarget.value)}
       onBlur={accept}
       onKeyDown={(event: KeyboardEvent) => {

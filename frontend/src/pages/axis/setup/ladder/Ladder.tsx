@@ -47,23 +47,25 @@ export function Ladder({ pmm, pmc }: PictureProps) {
       <ReadNow device={pmc} addresses={addresses("pmc")} />
       <Voltages lines={lines} />
       {live && <Zone steps={steps} voltage={live.at} look={look} />}
-      <div className={classes.lane} data-head>
-        <span />
-        <Ticks scale={scale} step={GRID_V} unit="V" />
-        <span />
+      <div className={classes.steps}>
+        <div className={classes.lane} data-head>
+          <span />
+          <Ticks scale={scale} step={GRID_V} unit="V" />
+          <span />
+        </div>
+        {[...steps.keys()].reverse().map((at) => (
+          <StepRow
+            key={at}
+            steps={steps}
+            at={at}
+            setup={setup}
+            pmm={pmm}
+            pmc={pmc}
+            scale={scale}
+            lines={lines}
+          />
+        ))}
       </div>
-      {[...steps.keys()].reverse().map((at) => (
-        <StepRow
-          key={at}
-          steps={steps}
-          at={at}
-          setup={setup}
-          pmm={pmm}
-          pmc={pmc}
-          scale={scale}
-          lines={lines}
-        />
-      ))}
       <Findings findings={findingsOf(steps.map(of))} />
     </section>
   );
@@ -131,7 +133,7 @@ function StepRow({ steps, at, setup, pmm, pmc, scale, lines }: RowProps) {
           <TypedValue
             parameter={parameter}
             name={name}
-            label={t("page.setup.ladder.typed")}
+
             bounds={bounds}
           />
         </div>

@@ -56,7 +56,7 @@ export function PositionRange({ unit, pmc, setup }: Props) {
       <h3 id="setup-range">{t("page.setup.masks.range.title")}</h3>
       <p className="dim">{t("page.setup.masks.range.intro")}</p>
       <div className={classes.range}>
-        <svg viewBox="-140 -124 280 150" className={classes.arc} data-testid="range-arc">
+        <svg viewBox="-150 -136 300 166" className={classes.arc} data-testid="range-arc">
           <path d={arcPath(-180, 180, RADIUS)} className={classes.whole} />
           {lower.raw !== null && upper.raw !== null && (
             <path
@@ -65,7 +65,7 @@ export function PositionRange({ unit, pmc, setup }: Props) {
             />
           )}
           {TICKS.map((tick) => {
-            const { x, y } = pointAt(tick, RADIUS + 16);
+            const { x, y } = pointAt(tick, RADIUS + 28);
             return (
               <text key={tick} x={x} y={y + (tick % 180 === 0 && tick !== 0 ? 14 : 3)} aria-hidden>
                 {tick}°

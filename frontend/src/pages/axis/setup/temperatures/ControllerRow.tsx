@@ -34,6 +34,7 @@ export function ControllerRow({ lane, spot, unit, setup, scale, live }: Props) {
   const t = useTexts();
   const [stopped, setStopped] = useState<{ parameter: Parameter; by: Edge } | null>(null);
   const place = t(`page.temperature.${spot.key}`);
+  const short = (kind: MarkKind) => t(`page.setup.temperatures.short.${kind}`);
   const kindName = (kind: MarkKind) => t(`page.setup.temperatures.mark.${kind}`);
   const look = (address: string) => setup.of(unit, address)?.raw ?? null;
   const coolerKind: MarkKind = lane.heater === null ? "fan" : "cooler";
@@ -72,7 +73,7 @@ export function ControllerRow({ lane, spot, unit, setup, scale, live }: Props) {
               key={kind}
               parameter={parameter}
               name={name}
-              label={kindName(kind)}
+              label={short(kind)}
               scale={scale}
               bounds={bounds}
               snap={1}
@@ -84,13 +85,13 @@ export function ControllerRow({ lane, spot, unit, setup, scale, live }: Props) {
         </Track>
         <div className={classes.numbers}>
           {marks.map(({ kind, parameter, bounds, name }) => (
-            <TypedValue key={kind} parameter={parameter} name={name} label={kindName(kind)} bounds={bounds} />
+            <TypedValue key={kind} parameter={parameter} name={name} label={short(kind)} bounds={bounds} />
           ))}
           {hysteresis && (
             <TypedValue
               parameter={hysteresis}
               name={`${place}: ${t("page.setup.temperatures.hysteresis")} (${lane.hysteresis})`}
-              label={t("page.setup.temperatures.hysteresis")}
+              label={t("page.setup.temperatures.short.hysteresis")}
               bounds={boundsOf(hysteresis, hysteresisBounds(lane, look, kindName), look)}
             />
           )}
@@ -98,7 +99,7 @@ export function ControllerRow({ lane, spot, unit, setup, scale, live }: Props) {
             <TypedValue
               parameter={delay}
               name={`${place}: ${t("page.setup.temperatures.delay")} (${lane.delay})`}
-              label={t("page.setup.temperatures.delay")}
+              label={t("page.setup.temperatures.short.delay")}
               bounds={boundsOf(delay, { low: null, high: null }, look)}
             />
           )}

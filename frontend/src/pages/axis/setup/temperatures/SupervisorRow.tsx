@@ -39,6 +39,7 @@ export function SupervisorRow({ lane, spot, unit, setup, scale, live, raw }: Pro
   const t = useTexts();
   const [stopped, setStopped] = useState<{ parameter: Parameter; by: Edge } | null>(null);
   const place = t(`page.temperature.${spot.key}`);
+  const short = (kind: MarkKind) => t(`page.setup.temperatures.short.${kind}`);
   const kindName = (kind: MarkKind) => t(`page.setup.temperatures.mark.${kind}`);
   const look = (address: string) => setup.of(unit, address)?.raw ?? null;
   const marks = lane.marks.flatMap((mark) => {
@@ -65,7 +66,7 @@ export function SupervisorRow({ lane, spot, unit, setup, scale, live, raw }: Pro
               key={mark.address}
               parameter={parameter}
               name={name}
-              label={kindName(mark.kind)}
+              label={short(mark.kind)}
               scale={scale}
               bounds={bounds}
               snap={1}
@@ -82,7 +83,7 @@ export function SupervisorRow({ lane, spot, unit, setup, scale, live, raw }: Pro
               key={mark.address}
               parameter={parameter}
               name={name}
-              label={kindName(mark.kind)}
+              label={short(mark.kind)}
               bounds={bounds}
             />
           ))}
