@@ -256,6 +256,7 @@ def test_an_axis_is_set_up_and_canopen_reads_it_back(page: Page, bench: tuple[st
     page.reload()
     pending(page, 10)
     page.get_by_test_id("review").click()
+    expect(page.get_by_test_id("review-order")).to_have_attribute("data-known", "true")
     turns = [
         int(page.get_by_test_id(f"turn-{address}").inner_text().rstrip("."))
         for address in ("6510:05", "30FA:02", "30FC:01", "30FC:02", "30FB:07")
