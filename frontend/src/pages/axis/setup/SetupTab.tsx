@@ -1,5 +1,5 @@
 import { SegmentedControl } from "@mantine/core";
-import { type ComponentType, Suspense } from "react";
+import { type ComponentType, lazy, Suspense } from "react";
 import type { StationRef } from "../../../api/types";
 import { usePageSearch } from "../../../frame/search";
 import { useWatchDevice } from "../../../live/live";
@@ -8,7 +8,9 @@ import { useTexts } from "../../../texts/texts";
 import { useDeviceContext } from "../../../ui/reading";
 import classes from "../Axis.module.css";
 import { BladeStrip } from "../BladeStrip";
+import room from "../../../ui/Room.module.css";
 import { PMC, PMM } from "../../overview/layout";
+import { StagedBar, StagedRoom } from "../../parameters/StagedRoom";
 
 /** What a picture is drawn of: the two units of a blade, as far as the station has them. */
 export interface PictureProps {
@@ -18,16 +20,22 @@ export interface PictureProps {
 }
 
 /** Each comes when it is looked at; the first one needs no mention in the address. */
-const PICTURES: Readonly<Record<string, ComponentType<PictureProps>>> = {};
+const PICTURES: Readonly<Record<string, ComponentType<PictureProps>>> = {
+  temperatures: lazy(async () => ({ default: (await import("./temperatures/Temperatures")).Temperatures })),
+  masks: lazy(async () => ({ default: (await import("./masks/Masks")).Masks })),
+  ladder: lazy(async () => ({ default: (await import("./ladder/Ladder")).Ladder })),
+};
 
 /** The pictures that set up an axis; what is changed in one is staged, and written from the review of all changes. */
 export function SetupTab() {
   return (
-    <div className={classes.page}>
-      <BladeStrip now={() => <Choice />}>
-        {(station) => <Picture key={station.slug} station={station} />}
-      </BladeStrip>
-    </div>
+    <StagedRoom>
+      <div className={classes.page}>
+        <BladeStrip now={() => <Choice />}>
+          {(station) => <Picture key={station.slug} station={station} />}
+        </BladeStrip>
+      </div>
+    </StagedRoom>
   );
 }
 
@@ -41,14 +49,21 @@ function useChosen(): string | undefined {
 function Choice() {
   const t = useTexts();
   const [, update] = usePageSearch();
+  const chosen = useChosen();
   return (
-    <SegmentedControl
-      value={useChosen() ?? ""}
-      onChange={(chosen) => update({ picture: chosen === names[0] ? undefined : chosen })}
-      data={names.map((one) => ({ value: one, label: t(`page.setup.picture.${one}`) }))}
-      aria-label={t("page.setup.choose")}
-      data-testid="choose-picture"
-    />
+    <>
+      {chosen !== undefined && (
+        <SegmentedControl
+          value={chosen}
+          onChange={(one) => update({ picture: one === names[0] ? undefined : one })}
+          data={names.map((one) => ({ value: one, label: t(`page.setup.picture.${one}`) }))}
+          aria-label={t("page.setup.choose")}
+          data-testid="choose-picture"
+        />
+      )}
+      <span className={room.spacer} />
+      <StagedBar />
+    </>
   );
 }
 
