@@ -71,6 +71,8 @@
     │   ├── InterlockError                  an interlock keeps the axis from moving; names it
     │   ├── AxisStateError                  the axis is in another state than the command wants
     │   ├── NotPreparedError                motion of the axis is not prepared
+    │   ├── BatteryConditionError           a condition of the battery test does not hold; names it
+    │   ├── BatteryNotNotedError            the old battery was not noted before its change
     │   ├── NoInstructorError               the connected turbine is none of the twins that we started
     │   └── FaultOrderError                 a fault that cannot be put into a twin so; names the field
     │       └── FaultValueError             one of its values is out of range; names the limits
@@ -82,6 +84,10 @@
     │   ├── BusOpenError                    the adapter could not be opened
     │   └── TwinsGoneError                  the twins that we started do not answer
     ├── UnverifiedError            exit 6   sent, but what was read back differs or could not be read
+    │   ├── BatteryCommandError             a command to the battery management has no effect
+    │   ├── BatteryArmedError               the link was lost while a battery test was armed
+    │   ├── BatteryCounterError             the charge counter is not known to be 0
+    │   └── BatteryUnsavedError             the charge counter is 0, but not saved
     ├── RestoreBrokenError         exit 6   a restore ended otherwise than ordered; says why
     ├── RecordingError             exit 2   a recording is damaged or cannot be written
     └── ProtocolError              exit 4   bytes on the wire that no rule of the protocol allows
@@ -524,6 +530,18 @@ class NotPreparedError(RefusedError):
     code = "not_prepared"
 
 
+class BatteryConditionError(RefusedError):
+    """A condition of the battery test does not hold. Details: device, condition, reason."""
+
+    code = "battery_condition"
+
+
+class BatteryNotNotedError(RefusedError):
+    """The old battery was not noted before its change. Details: device."""
+
+    code = "battery_not_noted"
+
+
 class NoInstructorError(RefusedError):
     """Faults go only into twins that this server has started, and the connected turbine is none of them."""
 
@@ -599,6 +617,30 @@ class UnverifiedError(HubsideError):
 
     code = "unverified"
     exit_code = 6
+
+
+class BatteryCommandError(UnverifiedError):
+    """A command to the battery management has no effect. Details: device, command, word (3040h now), seconds."""
+
+    code = "battery_command"
+
+
+class BatteryArmedError(UnverifiedError):
+    """The link was lost while a battery test was armed: it may begin by itself. Details: device, reason."""
+
+    code = "battery_armed"
+
+
+class BatteryCounterError(UnverifiedError):
+    """The charge counter is not known to be 0. Details: device, counter (what it reads, or a dash), reason."""
+
+    code = "battery_counter"
+
+
+class BatteryUnsavedError(UnverifiedError):
+    """The charge counter is 0 in RAM and the save was not acknowledged. Details: device, reason."""
+
+    code = "battery_unsaved"
 
 
 class RestoreBrokenError(HubsideError):

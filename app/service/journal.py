@@ -62,6 +62,9 @@ class Kind(Enum):
     RESTORE_ROLLED_BACK = "restore_rolled_back"
     RESTORE_INCOMPLETE = "restore_incomplete"
     RESTORE_GIVEN_UP = "restore_given_up"
+    BATTERY_TEST_BEGUN = "battery_test_begun"
+    BATTERY_TEST_ENDED = "battery_test_ended"
+    BATTERY_CHANGED = "battery_changed"
 
     @property
     def severity(self) -> Severity:
@@ -101,6 +104,7 @@ _WARNINGS: Final = (
     Kind.FAULT_SET,
     Kind.FAULT_SEEN,
     Kind.SCENARIO_STARTED,
+    Kind.BATTERY_TEST_BEGUN,
 )
 _DONE: Final = (
     Kind.NMT_SENT,
@@ -130,6 +134,8 @@ _DONE: Final = (
     Kind.FAULT_CLEARED,
     Kind.SCENARIO_STARTED,
     Kind.SCENARIO_STOPPED,
+    Kind.BATTERY_TEST_BEGUN,
+    Kind.BATTERY_CHANGED,
 )
 
 

@@ -63,6 +63,8 @@ _STATUS: Final[tuple[tuple[type[HubsideError], HTTPStatus], ...]] = (
     (errors.InterlockError, HTTPStatus.CONFLICT),
     (errors.AxisStateError, HTTPStatus.CONFLICT),
     (errors.NotPreparedError, HTTPStatus.CONFLICT),
+    (errors.BatteryConditionError, HTTPStatus.CONFLICT),
+    (errors.BatteryNotNotedError, HTTPStatus.CONFLICT),
     (errors.OvertakenError, HTTPStatus.CONFLICT),
     (errors.RefusedError, HTTPStatus.UNPROCESSABLE_ENTITY),
     (errors.ColumnError, HTTPStatus.NOT_FOUND),

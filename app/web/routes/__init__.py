@@ -9,6 +9,7 @@ from app.web.in_replay import WRITES_ONLY_LIVE
 from app.web.routes import (
     analysis,
     audit,
+    battery,
     compare,
     desk,
     devices,
@@ -41,6 +42,7 @@ FEATURES = (
     jobs,
     stop,
     motion,
+    battery,
     writes,
     recordings,
     exchange,
