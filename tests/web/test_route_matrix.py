@@ -61,6 +61,7 @@ ROUTES: Final[dict[tuple[str, str], Role]] = {
     ("POST", "/api/live/motion/lease/give-back"): TECHNICIAN,
     ("POST", "/api/live/motion/confirm"): TECHNICIAN,
     ("GET", "/api/live/devices/{turbine}/{station}/{device}/motion/interlocks"): VIEWER,
+    ("GET", "/api/live/devices/{turbine}/{station}/{device}/motion/positions"): VIEWER,
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/prepare"): TECHNICIAN,
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/put-back"): TECHNICIAN,
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/jog"): TECHNICIAN,
