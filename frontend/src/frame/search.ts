@@ -42,6 +42,9 @@ export interface PageSearch {
   span?: string;
   /** The picture of the setting up that is open. */
   picture?: string;
+  /** The gear trains that are typed there, of the motor and of the blade encoder ("1024/1~1/183x12/111~36000/1"). */
+  gear?: string;
+  ae?: string;
   /** Name of the recording or set that is open. */
   file?: string;
   /** Filter, order (column, minus sign where descending) and hidden columns of the tables of files, sets and the bus. */
@@ -120,6 +123,8 @@ const TEXTS = [
   "camera",
   "span",
   "picture",
+  "gear",
+  "ae",
   "file",
   "find",
   "order",

@@ -106,9 +106,7 @@ export function ReviewList({ places, onClose }: { places: readonly Place[]; onCl
             tone="accent"
             hint={t("page.hold")}
             disabled={stopped > 0 || asked > 0 || unordered || order.isPending || write.isPending}
-            onHeld={() =>
-              write.mutate({ changes: rows.map((row) => row.change), save, onFailure, accepted })
-            }
+            onHeld={() => write.mutate({ changes: rows.map((row) => row.change), save, onFailure, accepted })}
             testId="write-hold"
           >
             {t("page.review.write", { count: rows.length, devices: plans.length })}
@@ -233,12 +231,7 @@ function DeviceBlock({ plan, turns, save, onSave }: BlockProps) {
       )}
       <ol>
         {plan.rows.map((row) => (
-          <ReviewRow
-            key={row.change.address}
-            row={row}
-            turn={turnOf(row, turns)}
-            context={plan.context}
-          />
+          <ReviewRow key={row.change.address} row={row} turn={turnOf(row, turns)} context={plan.context} />
         ))}
       </ol>
     </section>
@@ -268,7 +261,11 @@ function ReviewRow({ row, turn, context }: RowProps) {
   return (
     <li className={classes.reviewRow} data-testid={`review-row-${change.address}`}>
       <div className={classes.reviewLine}>
-        <span className={classes.turn} title={t("page.review.order.turn")} data-testid={`turn-${change.address}`}>
+        <span
+          className={classes.turn}
+          title={t("page.review.order.turn")}
+          data-testid={`turn-${change.address}`}
+        >
           {Number.isFinite(turn) ? `${turn}.` : "–"}
         </span>
         <span className={classes.address}>{change.address}</span>

@@ -23,7 +23,8 @@ export function ReviewOrder({ plan, accepted, onAccept }: Props) {
     <section data-testid="review-order">
       {!none && plan.rows.length > 1 && (
         <Text size="sm" className="dim">
-          <IconListNumbers size={16} className={classes.inText} aria-hidden /> {t("page.review.order.numbered")}
+          <IconListNumbers size={16} className={classes.inText} aria-hidden />{" "}
+          {t("page.review.order.numbered")}
         </Text>
       )}
       {plan.unknown.length > 0 && (

@@ -22,6 +22,7 @@ export interface PictureProps {
 /** Each comes when it is looked at; the first one needs no mention in the address. */
 const PICTURES: Readonly<Record<string, ComponentType<PictureProps>>> = {
   battery: lazy(async () => ({ default: (await import("./battery/BatteryPicture")).BatteryPicture })),
+  gear: lazy(async () => ({ default: (await import("./gear/GearPicture")).GearPicture })),
 };
 
 /** The pictures that set up an axis; what is changed in one is staged, and written from the review of all changes. */
