@@ -2,6 +2,7 @@ import axis from "../../Axis.module.css";
 import { useShown } from "../../../../live/live";
 import { useTexts } from "../../../../texts/texts";
 import type { PictureProps } from "../SetupTab";
+import classes from "./Battery.module.css";
 import { BatteryFacts } from "./BatteryFacts";
 import { BatteryString } from "./BatteryString";
 import { ChangePanel } from "./ChangePanel";
@@ -36,9 +37,11 @@ export function BatteryPicture({ pmm }: PictureProps) {
       <ChargerPanel pmm={pmm} />
       <section className={`${axis.panel} ${axis.plots}`} aria-label={t("page.setup.battery.settings")}>
         <h2>{t("page.setup.battery.settings")}</h2>
-        {SETTINGS.map((address) => (
-          <StagedField key={address} context={pmm} address={address} />
-        ))}
+        <div className={classes.settings}>
+          {SETTINGS.map((address) => (
+            <StagedField key={address} context={pmm} address={address} />
+          ))}
+        </div>
       </section>
       {!recorded && <TestPanel slug={pmm.slug} />}
       {!recorded && <ChangePanel slug={pmm.slug} />}

@@ -74,13 +74,13 @@ export function CheckMove({ pmc }: { pmc: DeviceContext }) {
             <Select
               label={t("page.setup.gear.towards")}
               data={[
-                { value: "minus", label: t("page.motion.to_zero") },
-                { value: "plus", label: t("page.motion.to_feather") },
+                { value: "minus", label: t("page.setup.gear.towards_zero") },
+                { value: "plus", label: t("page.setup.gear.towards_feather") },
               ]}
               value={towards}
               onChange={(value) => value !== null && setTowards(value)}
               allowDeselect={false}
-              w={150}
+              w={180}
               data-testid="check-towards"
             />
             <RunButton
