@@ -157,8 +157,16 @@ class Sequence:
         found = await read_numbers(self._driver, self._target, wanted)
         if found[BATTERY_V] is not None and len(self.course) < MOST_SAMPLES:
             blocs = tuple(found[one] for one in self._blocs)
-            measured = (found[one] for one in (BATTERY_V, CHARGER_V, LOWEST_V, CURRENT_MA, BOOSTER_A))
-            self.course.append(Sample(self.took_ms, *measured, blocs))
+            sample = Sample(
+                t_ms=self.took_ms,
+                battery_v=found[BATTERY_V],
+                charger_v=found[CHARGER_V],
+                lowest_v=found[LOWEST_V],
+                current_ma=found[CURRENT_MA],
+                booster_a=found[BOOSTER_A],
+                blocs_mv=blocs,
+            )
+            self.course.append(sample)
         status = found[TEST_STATUS]
         self._see(status)
         return status

@@ -105,6 +105,11 @@ export function CheckMove({ pmc }: { pmc: DeviceContext }) {
             w={250}
             data-testid="scale"
           />
+          <p data-testid="check-ended">
+            {moved !== null &&
+              line?.ended?.device === device &&
+              `${t(`motion.doing.${line.ended.doing}`)}: ${t(`motion.ended.${line.ended.why}`)}`}
+          </p>
           <OrderProblem error={order.error} title={t("page.motion.order_failed")} />
         </section>
       </div>
