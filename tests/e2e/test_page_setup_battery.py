@@ -173,15 +173,23 @@ def test_the_manuals_example_is_typed_staged_and_written(empty: tuple[BrowserCon
     page.close()
 
 
+def move_whole(page: Page, tries: int = 5) -> None:
+    """Hold until the blade stands. A page that the machine starves is stopped, as it must be, and pressed again."""
+    for _ in range(tries):
+        press(page, "check-run")
+        expect(page.get_by_test_id("check-ended")).to_contain_text("Move:", timeout=MOVE_MS)
+        page.mouse.up()
+        if page.get_by_test_id("check-ended").inner_text() == "Move: done":
+            return
+    raise AssertionError(page.get_by_test_id("check-ended").inner_text())
+
+
 def test_a_slow_move_tells_the_ratio_that_would_be_right(context: BrowserContext, demo: str) -> None:
     page = picture(context, demo, "gear", 3)
     take_control(page)
     prepare(page)
     expect(page.get_by_test_id("scale")).to_be_disabled()
-    press(page, "check-run")
-    expect(page.get_by_test_id("check-result")).to_be_visible(timeout=MOVE_MS)
-    page.mouse.up()
-    expect(page.get_by_test_id("check-ended")).to_have_text("Move: done")
+    move_whole(page)
     expect(page.get_by_test_id("verdict-encoders")).to_have_attribute("data-verdict", "agrees")
     page.get_by_test_id("scale").fill("ten")
     expect(page.get_by_test_id("verdict-motor")).to_have_count(0)
