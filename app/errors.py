@@ -77,6 +77,8 @@
     │   ├── PdoChangedError                 a PDO is set up otherwise than when it was looked at
     │   ├── PdoBusyError                    PDOs cannot be changed now; says why
     │   ├── PdoNoUndoError                  no change of PDOs that could be put back
+    │   ├── BatteryConditionError           a condition of the battery test does not hold; names it
+    │   ├── BatteryNotNotedError            the old battery was not noted before its change
     │   ├── NoInstructorError               the connected turbine is none of the twins that we started
     │   └── FaultOrderError                 a fault that cannot be put into a twin so; names the field
     │       └── FaultValueError             one of its values is out of range; names the limits
@@ -88,6 +90,10 @@
     │   ├── BusOpenError                    the adapter could not be opened
     │   └── TwinsGoneError                  the twins that we started do not answer
     ├── UnverifiedError            exit 6   sent, but what was read back differs or could not be read
+    │   ├── BatteryCommandError             a command to the battery management has no effect
+    │   ├── BatteryArmedError               the link was lost while a battery test was armed
+    │   ├── BatteryCounterError             the charge counter is not known to be 0
+    │   └── BatteryUnsavedError             the charge counter is 0, but not saved
     ├── RestoreBrokenError         exit 6   a restore ended otherwise than ordered; says why
     ├── PdoRolledBackError         exit 6   a change of PDOs failed; what stood before stands again, read back
     ├── PdoBrokenError             exit 6   a change of PDOs failed, and could not be put back
@@ -571,6 +577,18 @@ class PdoNoUndoError(RefusedError):
     code = "pdo_no_undo"
 
 
+class BatteryConditionError(RefusedError):
+    """A condition of the battery test does not hold. Details: device, condition, reason."""
+
+    code = "battery_condition"
+
+
+class BatteryNotNotedError(RefusedError):
+    """The old battery was not noted before its change. Details: device."""
+
+    code = "battery_not_noted"
+
+
 class NoInstructorError(RefusedError):
     """Faults go only into twins that this server has started, and the connected turbine is none of them."""
 
@@ -646,6 +664,30 @@ class UnverifiedError(HubsideError):
 
     code = "unverified"
     exit_code = 6
+
+
+class BatteryCommandError(UnverifiedError):
+    """A command to the battery management has no effect. Details: device, command, word (3040h now), seconds."""
+
+    code = "battery_command"
+
+
+class BatteryArmedError(UnverifiedError):
+    """The link was lost while a battery test was armed: it may begin by itself. Details: device, reason."""
+
+    code = "battery_armed"
+
+
+class BatteryCounterError(UnverifiedError):
+    """The charge counter is not known to be 0. Details: device, counter (what it reads, or a dash), reason."""
+
+    code = "battery_counter"
+
+
+class BatteryUnsavedError(UnverifiedError):
+    """The charge counter is 0 in RAM and the save was not acknowledged. Details: device, reason."""
+
+    code = "battery_unsaved"
 
 
 class RestoreBrokenError(HubsideError):

@@ -12,6 +12,8 @@ from typing import Final
 from app.errors import HubsideError, NotConnectedError, StoreError
 from app.service.as_found import REASON, is_whole, look, unreachable, until_back
 from app.service.backup import ReadReport, whole_sets
+from app.service.battery.archive import Archive as BatteryArchive
+from app.service.battery.desk import BatteryDesk
 from app.service.bitrates import with_bitrates
 from app.service.connection import Connection
 from app.service.indexing import Indexing
@@ -76,6 +78,8 @@ class Bench:
         self.polling = Polling(self.office.store)
         self.connection: Connection | None = None
         self.motion: MotionDesk | None = None
+        self.battery_archive = BatteryArchive(self.office.store, self.stamper)
+        self.batteries: BatteryDesk | None = None
         self._left = Left(self.office.store)
         self.pdos = PdoDesk(self.office.store, self.stamper)
         self.twins: TwinWatch | None = None
@@ -134,6 +138,7 @@ class Bench:
         connection.gate.blocks = self.restores.blocks
         self.connection = connection
         self.motion = MotionDesk(connection, self.journal, self._left)
+        self.batteries = BatteryDesk(connection, self.motion, self.battery_archive)
         self.twins = TwinWatch(connection.targets, connection.buses, self.instructor is not None)
         self.epoch += 1
 
@@ -189,9 +194,11 @@ class Bench:
             return
         await self._end_look()
         await self._keep(self.office.visits.keep_left(connection.targets, person))
+        if self.batteries is not None:
+            await self.batteries.close()
         if self.motion is not None:
             await self.motion.close()
-        self.connection, self.twins, self.motion = None, None, None
+        self.connection, self.twins, self.motion, self.batteries = None, None, None, None
         self.epoch += 1
         self.journal.by(person).note(Kind.DISCONNECTED, None, turbine=connection.turbine.name)
         await connection.close()

@@ -66,6 +66,9 @@ class Kind(Enum):
     PDO_PUT_BACK = "pdo_put_back"
     PDO_ROLLED_BACK = "pdo_rolled_back"
     PDO_BROKEN = "pdo_broken"
+    BATTERY_TEST_BEGUN = "battery_test_begun"
+    BATTERY_TEST_ENDED = "battery_test_ended"
+    BATTERY_CHANGED = "battery_changed"
 
     @property
     def severity(self) -> Severity:
@@ -109,6 +112,7 @@ _WARNINGS: Final = (
     Kind.FAULT_SET,
     Kind.FAULT_SEEN,
     Kind.SCENARIO_STARTED,
+    Kind.BATTERY_TEST_BEGUN,
 )
 _DONE: Final = (
     Kind.NMT_SENT,
@@ -142,6 +146,8 @@ _DONE: Final = (
     Kind.FAULT_CLEARED,
     Kind.SCENARIO_STARTED,
     Kind.SCENARIO_STOPPED,
+    Kind.BATTERY_TEST_BEGUN,
+    Kind.BATTERY_CHANGED,
 )
 
 

@@ -172,6 +172,18 @@ STEPS: Final[tuple[tuple[str, ...], ...]] = (
             for doing in ("UPDATE", "DELETE")
         ),
     ),
+    (
+        """CREATE TABLE battery_records (
+            id TEXT PRIMARY KEY NOT NULL, device TEXT NOT NULL, kind TEXT NOT NULL, t_ns INTEGER NOT NULL,
+            person TEXT NOT NULL, content TEXT NOT NULL
+        ) STRICT""",
+        "CREATE INDEX battery_records_device ON battery_records (device, kind, id)",
+        *(
+            f"""CREATE TRIGGER battery_records_never_{doing.lower()} BEFORE {doing} ON battery_records
+            BEGIN SELECT RAISE(ABORT, 'rows of battery_records are kept as they are'); END"""
+            for doing in ("UPDATE", "DELETE")
+        ),
+    ),
 )
 SCHEMA: Final = len(STEPS)
 """The version that this program writes."""

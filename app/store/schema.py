@@ -346,3 +346,15 @@ recording_hashes = Table(
     Column("t_ns", Integer, nullable=False),
 )
 """The hash of a whole file by that of its ends and its size: a large file is read once."""
+
+battery_records = Table(
+    "battery_records",
+    metadata,
+    Column("id", Text, primary_key=True),
+    Column("device", Text, nullable=False),
+    Column("kind", Text, nullable=False),
+    Column("t_ns", Integer, nullable=False),
+    Column("person", Text, nullable=False),
+    Column("content", Text, nullable=False),
+)
+"""Tests and changes of batteries; ``content`` is JSON of ``service.battery.records``. Rows are kept as they are."""

@@ -64,6 +64,8 @@ _STATUS: Final[tuple[tuple[type[HubsideError], HTTPStatus], ...]] = (
     (errors.InterlockError, HTTPStatus.CONFLICT),
     (errors.AxisStateError, HTTPStatus.CONFLICT),
     (errors.NotPreparedError, HTTPStatus.CONFLICT),
+    (errors.BatteryConditionError, HTTPStatus.CONFLICT),
+    (errors.BatteryNotNotedError, HTTPStatus.CONFLICT),
     (errors.OvertakenError, HTTPStatus.CONFLICT),
     (errors.PdoUnknownError, HTTPStatus.CONFLICT),
     (errors.PdoChangedError, HTTPStatus.CONFLICT),

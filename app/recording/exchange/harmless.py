@@ -24,6 +24,7 @@ TEXT_KEYS: Final = frozenset(
     restore_done restore_rolled_back restore_incomplete restore_given_up nmt_sent lease_taken lease_ended
     motion_prepared motion_put_back motion_begun motion_ended motion_stopped fault_reset homed pdo_changed pdo_put_back
     pdo_rolled_back pdo_broken
+    battery_test_begun battery_test_ended battery_changed
     """.split()
 )
 """The texts of events that recordings of this bench bear."""

@@ -9,6 +9,7 @@ from app.web.in_replay import WRITES_ONLY_LIVE
 from app.web.routes import (
     analysis,
     audit,
+    battery,
     compare,
     desk,
     devices,
@@ -43,6 +44,7 @@ FEATURES = (
     stop,
     motion,
     pdo,
+    battery,
     writes,
     recordings,
     exchange,

@@ -17,7 +17,8 @@ from app.service.motion.desk import MotionDesk
 from app.service.motion.feathering import feather
 from app.service.motion.interlocks import Confirmed
 from app.service.motion.line import MotionLine, motion_line
-from app.web.deps import DEVICE, BenchOf, JournalOf, PersonOf, TargetOf, needs
+from app.service.motion.positions import Positions, positions
+from app.web.deps import DEVICE, BenchOf, ConnectionOf, JournalOf, PersonOf, TargetOf, needs
 from app.web.models.motion import (
     AnswerRequest,
     BrakeTestDoc,
@@ -102,6 +103,12 @@ async def confirm(desk: DeskOf, request: ConfirmRequest) -> MotionLine:
 async def interlocks(desk: DeskOf, target: TargetOf) -> list[InterlockDoc]:
     """How every interlock of an axis stands."""
     return [InterlockDoc.of(standing) for standing in await desk.interlocks(target.slug)]
+
+
+@router.get(MOTION + "/positions")
+async def encoder_positions(connection: ConnectionOf, target: TargetOf) -> Positions:
+    """Where both encoders say that the blade is, asked now."""
+    return await positions(connection.driver(target), target)
 
 
 @router.post(MOTION + "/prepare", dependencies=[TECHNICIAN])

@@ -9,6 +9,7 @@ type Schemas = components["schemas"];
 export type Lease = Schemas["LeaseDoc"];
 export type Interlock = Schemas["InterlockDoc"];
 export type Moved = Schemas["MovedDoc"];
+export type Positions = Schemas["Positions"];
 export type Prepared = Schemas["PreparedDoc"];
 export type Feathered = Schemas["FeatheredDoc"];
 export type BrakeTest = Schemas["BrakeTestDoc"];
@@ -43,6 +44,8 @@ export const moving = {
     send<MotionData>("POST", `${ROOT}/confirm`, { fence, rotor_locked: rotorLocked, people_out: peopleOut }),
   prepare: (slug: string, order: Order) => send<Prepared>("POST", `${axis(slug)}/prepare`, order),
   putBack: (slug: string, order: Order) => send<MotionData>("POST", `${axis(slug)}/put-back`, order),
+  /** Where both encoders say that the blade is, asked now. */
+  positions: (slug: string) => get<Positions>(`${axis(slug)}/positions`),
   jog: (slug: string, order: Order, speedDps: number) =>
     send<Moved>("POST", `${axis(slug)}/jog`, { ...order, speed_dps: speedDps }),
   move: (slug: string, order: Order, angleDeg: number, speedDps: number) =>

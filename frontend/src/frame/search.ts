@@ -44,6 +44,9 @@ export interface PageSearch {
   picture?: string;
   /** The PDO that is open to be changed. */
   pdo?: string;
+  /** The gear trains that are typed there, of the motor and of the blade encoder ("1024/1~1/183x12/111~36000/1"). */
+  gear?: string;
+  ae?: string;
   /** Name of the recording or set that is open. */
   file?: string;
   /** Filter, order (column, minus sign where descending) and hidden columns of the tables of files, sets and the bus. */
@@ -123,6 +126,8 @@ const TEXTS = [
   "span",
   "picture",
   "pdo",
+  "gear",
+  "ae",
   "file",
   "find",
   "order",

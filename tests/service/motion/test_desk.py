@@ -8,7 +8,15 @@ import time
 
 import pytest
 
-from app.errors import InterlockError, LeaseError, LimitError, NotHeldError, NotPreparedError, OvertakenError
+from app.errors import (
+    InterlockError,
+    LeaseError,
+    LimitError,
+    NotHeldError,
+    NotPreparedError,
+    OvertakenError,
+    UsageError,
+)
 from app.model.address import Address
 from app.model.axis_state import AxisState
 from app.service.connection import Connection
@@ -17,6 +25,7 @@ from app.service.motion.interlocks import Confirmed, Interlock
 from app.service.motion.left import Left
 from app.service.motion.line import motion_line
 from app.service.motion.moves import home, jog, move_to, reset_fault
+from app.service.motion.positions import positions
 from app.service.stop import Command, command_all
 from app.wire.nmt import NmtState
 from tests.e2e.test_interoperation import until
@@ -66,6 +75,16 @@ async def test_an_axis_proves_that_it_stops_by_itself_and_gets_its_settings_back
         await desk.put_back(AXIS, page.fence)
         assert (await number(connection, ABORT), await number(connection, WATCH)) == before
         await until(lambda: nmt_state(connection) is NmtState.PRE_OPERATIONAL)
+
+
+async def test_both_encoders_say_where_the_blade_is(connection: Connection) -> None:
+    target = connection.target(AXIS)
+    found = await positions(connection.driver(target), target)
+    assert found.position_deg == pytest.approx(await angle_deg(connection), abs=0.02)
+    assert found.blade_deg == pytest.approx(found.position_deg, abs=0.5)
+    pmm = connection.target("wtg-07/blade-1/pmm")
+    with pytest.raises(UsageError):
+        await positions(connection.driver(pmm), pmm)
 
 
 async def test_a_jog_moves_while_it_is_held_and_halts_when_let_go(connection: Connection) -> None:

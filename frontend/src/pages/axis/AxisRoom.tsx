@@ -10,7 +10,7 @@ const TABS = {
 };
 
 /** What belongs to one tab. */
-const OWN = ["span", "picture", "pdo", "review", "findings"] as const;
+const OWN = ["span", "picture", "pdo", "review", "findings", "gear", "ae"] as const;
 
 /** One axis: what it does and what moves it, what sets it up, and what measures it. */
 export function AxisRoom() {

@@ -24,6 +24,8 @@ const PICTURES: Readonly<Record<string, ComponentType<PictureProps>>> = {
   temperatures: lazy(async () => ({ default: (await import("./temperatures/Temperatures")).Temperatures })),
   masks: lazy(async () => ({ default: (await import("./masks/Masks")).Masks })),
   ladder: lazy(async () => ({ default: (await import("./ladder/Ladder")).Ladder })),
+  battery: lazy(async () => ({ default: (await import("./battery/BatteryPicture")).BatteryPicture })),
+  gear: lazy(async () => ({ default: (await import("./gear/GearPicture")).GearPicture })),
 };
 
 /** The pictures that set up an axis; what is changed in one is staged, and written from the review of all changes. */
