@@ -58,6 +58,7 @@ class Doing(Enum):
     MOVE = "move"
     HOMING = "homing"
     RESET = "reset"
+    SIGNAL = "signal"
 
 
 class Ended(Enum):
