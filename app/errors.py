@@ -71,6 +71,7 @@
     │   ├── InterlockError                  an interlock keeps the axis from moving; names it
     │   ├── AxisStateError                  the axis is in another state than the command wants
     │   ├── NotPreparedError                motion of the axis is not prepared
+    │   ├── SignalUnknownError              no such run of a test signal
     │   ├── NoInstructorError               the connected turbine is none of the twins that we started
     │   └── FaultOrderError                 a fault that cannot be put into a twin so; names the field
     │       └── FaultValueError             one of its values is out of range; names the limits
@@ -522,6 +523,12 @@ class NotPreparedError(RefusedError):
     """Motion of the axis is not prepared. Details: device."""
 
     code = "not_prepared"
+
+
+class SignalUnknownError(RefusedError):
+    """No such run of a test signal. Details: run."""
+
+    code = "signal_unknown"
 
 
 class NoInstructorError(RefusedError):

@@ -20,6 +20,7 @@ from app.service.journal import Journal, Kind
 from app.service.link import TwinWatch
 from app.service.motion.desk import MotionDesk
 from app.service.motion.left import Left
+from app.service.motion.probe import Probes
 from app.service.office.office import Office
 from app.service.options import Options
 from app.service.poll import Poller
@@ -75,6 +76,7 @@ class Bench:
         self.polling = Polling(self.office.store)
         self.connection: Connection | None = None
         self.motion: MotionDesk | None = None
+        self.probes: Probes | None = None
         self._left = Left(self.office.store)
         self.twins: TwinWatch | None = None
         self.epoch = 0
@@ -132,6 +134,7 @@ class Bench:
         connection.gate.blocks = self.restores.blocks
         self.connection = connection
         self.motion = MotionDesk(connection, self.journal, self._left)
+        self.probes = Probes(connection)
         self.twins = TwinWatch(connection.targets, connection.buses, self.instructor is not None)
         self.epoch += 1
 
@@ -189,7 +192,9 @@ class Bench:
         await self._keep(self.office.visits.keep_left(connection.targets, person))
         if self.motion is not None:
             await self.motion.close()
-        self.connection, self.twins, self.motion = None, None, None
+        if self.probes is not None:
+            await self.probes.close()
+        self.connection, self.twins, self.motion, self.probes = None, None, None, None
         self.epoch += 1
         self.journal.by(person).note(Kind.DISCONNECTED, None, turbine=connection.turbine.name)
         await connection.close()

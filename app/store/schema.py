@@ -346,3 +346,16 @@ recording_hashes = Table(
     Column("t_ns", Integer, nullable=False),
 )
 """The hash of a whole file by that of its ends and its size: a large file is read once."""
+
+signal_runs = Table(
+    "signal_runs",
+    metadata,
+    Column("id", Text, primary_key=True),
+    Column("device", Text, nullable=False),
+    Column("t_ns", Integer, nullable=False),
+    Column("person", Text, nullable=False),
+    Column("shape", Text, nullable=False),
+    Column("why", Text, nullable=False),
+    Column("content", Text, nullable=False),
+)
+"""Test signals that were run. ``content`` is JSON. Rows never change."""

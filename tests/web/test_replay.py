@@ -41,6 +41,8 @@ REFUSED_IN_REPLAY = {
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/move"),
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/home"),
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/reset"),
+    ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/signal"),
+    ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/probe/arm"),
     ("POST", "/api/live/motion/lease"),
     ("POST", "/api/live/motion/lease/ask"),
     ("POST", "/api/live/motion/confirm"),

@@ -14,6 +14,7 @@ from typing import Final
 from app.errors import HubsideError
 from app.model.address import Address
 from app.model.checks import Allow
+from app.model.datatypes import encode_raw
 from app.service.devices import decode
 from app.service.journal import Journal
 from app.service.motion.control import Control
@@ -63,8 +64,7 @@ class Borrowed:
 
     async def number(self, address: Address, raw: int) -> None:
         """Write a number, unless it stands there. Raises what a write raises, StoreError."""
-        size = self._control.target.entry(address).type.bits // 8
-        await self.put(address, raw.to_bytes(size, "little", signed=raw < 0))
+        await self.put(address, encode_raw(self._control.target.entry(address).type, raw))
 
     async def put(self, address: Address, data: bytes) -> None:
         """Write, noted before; nothing where it stands there. Raises what a write raises, StoreError."""

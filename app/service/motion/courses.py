@@ -45,10 +45,11 @@ class Courses:
         node = self._target.node
         with self._lock:
             for record in records:
-                if isinstance(record, ValueSeen) and record.node == node and record.address in self._seen:
-                    # Of the target counts what was sent, of all else what the device said.
-                    if (record.source in _SENT) is (record.address == DEMAND):
-                        self._seen[record.address].append((record.t_ns, record.data))
+                if not isinstance(record, ValueSeen) or record.node != node or record.address not in self._seen:
+                    continue
+                # Of the target counts what was sent, of all else what the device said.
+                if (record.source in _SENT) is (record.address == DEMAND):
+                    self._seen[record.address].append((record.t_ns, record.data))
 
     def of(self, address: Address, from_ns: int) -> tuple[Curve, Curve]:
         """Times in s from ``from_ns`` on, and scaled values."""
