@@ -23,6 +23,7 @@
     │   ├── ValueTypeError                  the value does not fit the data type
     │   ├── LimitError                      the value is out of range; names the limit
     │   ├── PreconditionError               another object or state forbids it
+    │   ├── OrderError                      no order of writes keeps all rules at every step
     │   ├── ConflictError                   another value than the one that was seen stands in RAM
     │   ├── OvertakenError                  STOP or FEATHER came before the write left
     │   ├── MotionError                     the write could set an axis in motion
@@ -235,6 +236,15 @@ class PreconditionError(RefusedError):
     """Another object or the device's state forbids it. Details: address, name, needs, found."""
 
     code = "precondition"
+
+
+class OrderError(RefusedError):
+    """Written with the rest of its batch, at no turn would the rules hold that must hold after every write.
+
+    Nothing was written. Details: address, name.
+    """
+
+    code = "order"
 
 
 class ConflictError(RefusedError):

@@ -1,24 +1,29 @@
-"""Write a reviewed batch of changes: checked as a whole, written one by one, read back, then saved device by device."""
+"""Write a reviewed batch of changes: checked as a whole, written one by one, read back, then saved device by device.
+
+They are written in an order in which, after every single write, the stepwise rules hold (``app.model.restore.batch``).
+"""
 
 from __future__ import annotations
 
 import asyncio
 from collections import Counter
-from collections.abc import Callable, Coroutine, Sequence
+from collections.abc import Callable, Coroutine, Iterable, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any
 
 from app.drivers.contract import Driver
-from app.errors import BusLostError, HubsideError, UsageError
+from app.errors import BusLostError, HubsideError, OrderError, UsageError
 from app.model.address import Address
 from app.model.checks import Allow, check_write
 from app.model.datatypes import Raw
+from app.model.station import Place
 from app.service.devices import Target
 from app.service.jobs import Job, JobRow, RowState
 from app.service.journal import Journal
 from app.service.save import save
 from app.service.write import write_raw
+from app.service.write_order import Device, KnownDevices
 
 
 class OnFailure(Enum):
@@ -41,15 +46,29 @@ class Change:
     raw: Raw
     expected: Raw | None = None
 
+    @property
+    def place(self) -> Place:
+        """The object."""
+        return Place(self.target.slug, self.address)
+
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """A batch as a person confirmed it. ``save``: slugs of the devices whose verified values are made permanent."""
+    """A batch as a person confirmed it. ``save``: slugs of the devices whose verified values are made permanent.
+
+    ``beside``: the other devices of the turbine, for rules look over all of a station. ``accepted``: the person accepts
+    that rules are broken that hold after every write elsewhere, where they are broken in the end.
+    """
 
     changes: Sequence[Change]
     save: frozenset[str]
     on_failure: OnFailure
     allow: Allow = Allow.NOTHING
+    beside: Sequence[Device] = ()
+    accepted: bool = False
+
+
+Row = tuple[Change, JobRow]
 
 
 def prepare(order: Order) -> list[JobRow]:
@@ -64,33 +83,71 @@ def prepare(order: Order) -> list[JobRow]:
 
 
 async def write_many(job: Job, order: Order, journal: Journal, now_ns: Callable[[], int]) -> None:
-    """Write the rows of ``prepare`` device by device, each in the order given; the job's rows tell how far it is.
+    """Write the rows of ``prepare``; the job's rows tell how far it is, in the order in which they are written.
 
     Every row is checked before the first is sent; a refused row is never sent, and with STOP none is then. A cancelled
     job ends between two writes, never within one. A lost bus ends it as well. What failed stands in the rows.
     """
     rows = list(zip(order.changes, job.rows, strict=True))
+    known = await _known(rows, order)
+    rows = _in_order(rows, known)
+    job.rows[:] = [row for _, row in rows]
     await _check_all(rows, order.allow)
     job.done = sum(row.state is RowState.REFUSED for row in job.rows)
     if job.done and order.on_failure is OnFailure.STOP:
         return
-    devices = list(dict.fromkeys(change.target.slug for change in order.changes))
-    for slug in devices:
-        own = [(change, row) for change, row in rows if change.target.slug == slug]
-        for change, row in own:
-            if row.state is not RowState.WAITING:
-                continue
-            await _whole(_write(change, row, order.allow, journal))
-            job.done += 1
-            if _ends(row, order.on_failure):
-                return
-    for slug in devices:
+    if await _write_all(job, rows, order, known, journal):
+        return
+    for slug in dict.fromkeys(change.target.slug for change in order.changes):
         if slug in order.save:
             own = [(change, row) for change, row in rows if change.target.slug == slug]
             await _whole(_save(own, journal, now_ns))
 
 
-async def _check_all(rows: Sequence[tuple[Change, JobRow]], allow: Allow) -> None:
+async def _known(rows: Sequence[Row], order: Order) -> KnownDevices:
+    """What the order of the writes rests on; what nobody knows is read."""
+    devices = {target.slug: (driver, target) for driver, target in order.beside}
+    devices |= {change.target.slug: (change.driver, change.target) for change, _ in rows}
+    known = KnownDevices([target for _, target in devices.values()], order.allow, order.accepted)
+    unknown = known.unknown(_wanted(rows))
+    await known.read(unknown, {slug: driver for slug, (driver, _) in devices.items()})
+    return known
+
+
+def _wanted(rows: Iterable[Row]) -> dict[Place, Raw]:
+    return {change.place: change.raw for change, _ in rows}
+
+
+def _in_order(rows: Sequence[Row], known: KnownDevices) -> list[Row]:
+    """The rows in the order in which they are written; those that have none come last, and are refused."""
+    by_place = {change.place: (change, row) for change, row in rows}
+    batch = known.order(_wanted(rows))
+    for place in batch.unordered:
+        change, row = by_place[place]
+        entry = change.target.entry(change.address)
+        row.state, row.error = RowState.REFUSED, OrderError(address=change.address.short, name=entry.title)
+    return [by_place[place] for place in (*batch.places, *batch.unordered)]
+
+
+async def _write_all(job: Job, rows: Sequence[Row], order: Order, known: KnownDevices, journal: Journal) -> bool:
+    """Write what waits; True where nothing more is to be done. After a failure the rest is put in order anew."""
+    waiting = [(change, row) for change, row in rows if row.state is RowState.WAITING]
+    while waiting:
+        change, row = waiting.pop(0)
+        await _whole(_write(change, row, order.allow, journal))
+        job.done += 1
+        if _ends(row, order.on_failure):
+            return True
+        if row.error is None:
+            known.put(change.place, change.raw)
+            continue
+        waiting = _in_order(waiting, known)
+        job.done += sum(one.state is RowState.REFUSED for _, one in waiting)
+        waiting = [(change, one) for change, one in waiting if one.state is RowState.WAITING]
+    return False
+
+
+async def _check_all(rows: Sequence[Row], allow: Allow) -> None:
     """Refuse what cannot be written, with the values that the rows before it will have set."""
     planned: dict[tuple[str, Address], Raw] = {}
     for change, row in rows:
@@ -106,7 +163,8 @@ async def _check_all(rows: Sequence[tuple[Change, JobRow]], allow: Allow) -> Non
         except HubsideError as error:
             row.state, row.error = RowState.REFUSED, error
         else:
-            planned[target.slug, change.address] = change.raw
+            if row.state is RowState.WAITING:
+                planned[target.slug, change.address] = change.raw
 
 
 def _ends(row: JobRow, on_failure: OnFailure) -> bool:
@@ -135,7 +193,7 @@ async def _write(change: Change, row: JobRow, allow: Allow, journal: Journal) ->
     row.state = RowState.VERIFIED if done.verified else RowState.UNPROVEN
 
 
-async def _save(rows: Sequence[tuple[Change, JobRow]], journal: Journal, now_ns: Callable[[], int]) -> None:
+async def _save(rows: Sequence[Row], journal: Journal, now_ns: Callable[[], int]) -> None:
     """Save one device where a value that it keeps was verified."""
     kept = [row for change, row in rows if row.state is RowState.VERIFIED and change.target.entry(change.address).saved]
     if not kept:

@@ -26,6 +26,7 @@ MEDIA_TYPE: Final = "application/problem+json"
 _STATUS: Final[tuple[tuple[type[HubsideError], HTTPStatus], ...]] = (
     (errors.UnknownObjectError, HTTPStatus.NOT_FOUND),
     (errors.PreconditionError, HTTPStatus.CONFLICT),
+    (errors.OrderError, HTTPStatus.CONFLICT),
     (errors.ConflictError, HTTPStatus.CONFLICT),
     (errors.ConsentError, HTTPStatus.CONFLICT),
     (errors.SettingsError, HTTPStatus.CONFLICT),

@@ -47,6 +47,7 @@ REFUSED_IN_REPLAY = {
     ("POST", "/api/live/motion/lease/ask"),
     ("POST", "/api/live/motion/confirm"),
     ("POST", "/api/live/writes"),
+    ("POST", "/api/live/writes/plan"),
     ("POST", "/api/live/backup"),
     ("POST", "/api/live/restore/plan"),
     ("POST", "/api/live/restore"),

@@ -79,6 +79,7 @@ ROUTES: Final[dict[tuple[str, str], Role]] = {
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/restart"): TECHNICIAN,
     ("GET", "/api/live/devices/{turbine}/{station}/{device}/changes"): VIEWER,
     ("POST", "/api/live/writes"): TECHNICIAN,
+    ("POST", "/api/live/writes/plan"): TECHNICIAN,
     ("GET", "/api/live/jobs/{job_id}"): VIEWER,
     ("DELETE", "/api/live/jobs/{job_id}"): TECHNICIAN,
     ("POST", "/api/live/stop"): VIEWER,

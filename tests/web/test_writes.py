@@ -84,6 +84,38 @@ async def test_a_batch_that_makes_no_sense_is_refused_as_a_whole(server: Server)
         assert (answer.status_code, answer.json()["code"]) == (status, code), body["rows"][:2]
 
 
+async def test_the_plan_tells_order_what_has_none_and_what_is_not_known(server: Server) -> None:
+    pmm, pmc = PMMS[0], "wtg-07/blade-1/pmc"
+    both = [row(pmm, 780, address="30FA:02"), row(pmc, 790, address="6510:05")]
+    unread = (await server.client.post("/api/live/writes/plan", json={"rows": both})).json()
+    assert {"device": pmc, "address": "6510:05"} in unread["unknown"]
+    for device in (pmm, pmc):
+        addresses = [one["address"] for one in unread["unknown"] if one["device"] == device]
+        done = await server.client.post(f"/api/live/devices/{device}/read", json={"addresses": addresses})
+        assert done.status_code == 200, done.text
+
+    plan = unread
+    async with asyncio.timeout(DEADLINE_S):
+        while plan["unknown"]:
+            plan = (await server.client.post("/api/live/writes/plan", json={"rows": both})).json()
+    assert plan == {
+        "rows": [{"device": pmc, "address": "6510:05"}, {"device": pmm, "address": "30FA:02"}],
+        "unordered": [],
+        "unknown": [],
+        "broken": [],
+    }
+    alone = (await server.client.post("/api/live/writes/plan", json={"rows": both[:1]})).json()
+    assert (alone["rows"], alone["unordered"]) == ([], [{"device": pmm, "address": "30FA:02"}])
+    assert [one["rule"] for one in alone["broken"]] == ["oat.dc_link_ladder"]
+    accepted = (await server.client.post("/api/live/writes/plan", json={"rows": both[:1], "accepted": True})).json()
+    assert (len(accepted["rows"]), accepted["unordered"]) == (1, [])
+
+    job = await written(server, {"rows": both[:1], "save": []})
+    assert [(one["state"], one["error"]["code"]) for one in job["rows"]] == [("refused", "order")]
+    job = await written(server, {"rows": both, "save": []})
+    assert [(one["device"], one["state"]) for one in job["rows"]] == [(pmc, "verified"), (pmm, "verified")]
+
+
 async def test_a_stranger_writes_nothing(server: Server) -> None:
     answer = await server.stranger.post("/api/live/writes", json={"rows": [row(PMMS[0], 490)], "save": []})
     assert answer.status_code == 401

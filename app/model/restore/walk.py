@@ -105,7 +105,7 @@ class Walk:
         for address in (*_limits_from(entry), *(condition.address for condition in entry.requires)):
             yield Place(place.slug, address)
         for rule in self._rules.get(place, ()):
-            yield from _places_of(self._station, rule)
+            yield from places_of(self._station, rule)
 
     def _harms(self, place: Place) -> bool:
         """True where a rule or a limit that rests on this object is broken, and was not at the beginning."""
@@ -154,12 +154,12 @@ def _rules_by_place(station: StationValues, rules: Sequence[Rule]) -> dict[Place
     """The rules that look at an object."""
     found: dict[Place, tuple[Rule, ...]] = {}
     for rule in rules:
-        for place in _places_of(station, rule):
+        for place in places_of(station, rule):
             found[place] = (*found.get(place, ()), rule)
     return found
 
 
-def _places_of(station: StationValues, rule: Rule) -> Iterator[Place]:
+def places_of(station: StationValues, rule: Rule) -> Iterator[Place]:
     """The objects that a rule looks at, in the devices that are there."""
     for device in station.devices:
         for address in rule.objects.get(device.description.id, ()):

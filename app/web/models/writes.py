@@ -21,10 +21,14 @@ class WritesRow(BaseModel):
 
 
 class WritesRequest(BaseModel):
-    """``save`` names the devices whose verified values are made permanent; with "stop" nothing follows a failure."""
+    """``save`` names the devices whose verified values are made permanent; with "stop" nothing follows a failure.
+
+    ``accepted``: rules that hold after every write elsewhere may be broken on the way where they are broken in the end.
+    """
 
     model_config = ConfigDict(extra="forbid")
 
     rows: Annotated[list[WritesRow], Field(min_length=1, max_length=500)]
     save: Annotated[list[Annotated[str, Field(max_length=200)]], Field(max_length=100)]
     on_failure: Literal["stop", "go-on"] = "stop"
+    accepted: bool = False

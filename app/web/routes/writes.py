@@ -6,14 +6,16 @@ from fastapi import APIRouter
 
 from app.model.address import parse_address
 from app.model.checks import Allow
-from app.model.roles import Role
+from app.model.roles import Role, SignedIn
 from app.service.connection import Connection
 from app.service.jobs import Job
 from app.service.views import raw_from_json
 from app.service.write_many import Change, OnFailure, Order, prepare, write_many
+from app.service.write_order import KnownDevices
 from app.web.deps import ConnectionOf, JobsOf, JournalOf, PersonOf, needs
 from app.web.models import JobDoc
 from app.web.models.writes import WritesRequest, WritesRow
+from app.web.models.writes_plan import WritesPlan, WritesPlanRequest
 from app.web.problem import NotFoundError
 from app.web.routes.jobs import job_doc
 
@@ -24,15 +26,34 @@ router = APIRouter(dependencies=[needs(Role.TECHNICIAN)])
 async def writes(
     connection: ConnectionOf, jobs: JobsOf, journal: JournalOf, person: PersonOf, request: WritesRequest
 ) -> JobDoc:
-    """Check, write, read back and save in the background. What only the maker sets needs an expert."""
-    allow = Allow.FACTORY if person.role.covers(Role.EXPERT) else Allow.NOTHING
+    """Check, put in order, write, read back and save in the background. What only the maker sets needs an expert."""
     changes = [_change(connection, row) for row in request.rows]
-    order = Order(changes, frozenset(request.save), OnFailure(request.on_failure), allow)
+    beside = [(connection.driver(target), target) for target in connection.targets]
+    order = Order(
+        changes,
+        frozenset(request.save),
+        OnFailure(request.on_failure),
+        _allowed(person),
+        beside,
+        request.accepted,
+    )
 
     async def work(job: Job) -> None:
         await write_many(job, order, journal, connection.stamper)
 
     return job_doc(jobs.start("write", "", work, prepare(order)))
+
+
+@router.post("/live/writes/plan")
+async def plan_writes(connection: ConnectionOf, person: PersonOf, request: WritesPlanRequest) -> WritesPlan:
+    """In which order a batch would be written, so that after every write all rules hold that must. Sends nothing."""
+    wanted = {change.place: change.raw for change in (_change(connection, row) for row in request.rows)}
+    known = KnownDevices(connection.targets, _allowed(person), request.accepted)
+    return WritesPlan.of(known.order(wanted), known.unknown(wanted))
+
+
+def _allowed(person: SignedIn) -> Allow:
+    return Allow.FACTORY if person.role.covers(Role.EXPERT) else Allow.NOTHING
 
 
 def _change(connection: Connection, row: WritesRow) -> Change:

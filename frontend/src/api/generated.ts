@@ -1473,9 +1473,29 @@ export interface paths {
         put?: never;
         /**
          * Writes
-         * @description Check, write, read back and save in the background. What only the maker sets needs an expert.
+         * @description Check, put in order, write, read back and save in the background. What only the maker sets needs an expert.
          */
         post: operations["writes"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/live/writes/plan": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Plan Writes
+         * @description In which order a batch would be written, so that after every write all rules hold that must. Sends nothing.
+         */
+        post: operations["plan_writes"];
         delete?: never;
         options?: never;
         head?: never;
@@ -8741,10 +8761,56 @@ export interface components {
             raw: number | string;
         };
         /**
+         * WritesPlan
+         * @description In which order a batch would be written, by what is known now.
+         *
+         *     ``unordered``: no order keeps the rules that hold after every write; ``broken``: those of them that are broken once
+         *     all is written. ``unknown``: not known yet, and read before the first write, so that the order may become another.
+         */
+        WritesPlan: {
+            /** Broken */
+            broken: components["schemas"]["RuleFinding"][];
+            /** Rows */
+            rows: components["schemas"]["RulePlace"][];
+            /** Unknown */
+            unknown: components["schemas"]["RulePlace"][];
+            /** Unordered */
+            unordered: components["schemas"]["RulePlace"][];
+        };
+        /**
+         * WritesPlanRequest
+         * @description The changes of a batch that is not ordered yet.
+         * @example {
+         *       "rows": [
+         *         {
+         *           "address": "30FA:02",
+         *           "device": "wtg-07/blade-2/pmm",
+         *           "raw": 780
+         *         }
+         *       ]
+         *     }
+         */
+        WritesPlanRequest: {
+            /**
+             * Accepted
+             * @default false
+             */
+            accepted: boolean;
+            /** Rows */
+            rows: components["schemas"]["WritesRow"][];
+        };
+        /**
          * WritesRequest
          * @description ``save`` names the devices whose verified values are made permanent; with "stop" nothing follows a failure.
+         *
+         *     ``accepted``: rules that hold after every write elsewhere may be broken on the way where they are broken in the end.
          */
         WritesRequest: {
+            /**
+             * Accepted
+             * @default false
+             */
+            accepted: boolean;
             /**
              * On Failure
              * @default stop
@@ -14660,6 +14726,86 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["JobDoc"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Conflict */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    plan_writes: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "rows": [
+                 *         {
+                 *           "address": "30FA:02",
+                 *           "device": "wtg-07/blade-2/pmm",
+                 *           "raw": 780
+                 *         }
+                 *       ]
+                 *     }
+                 */
+                "application/json": components["schemas"]["WritesPlanRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["WritesPlan"];
                 };
             };
             /** @description Unauthorized */

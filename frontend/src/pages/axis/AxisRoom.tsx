@@ -9,7 +9,7 @@ const TABS = {
 };
 
 /** What belongs to one tab. */
-const OWN = ["span", "picture"] as const;
+const OWN = ["span", "picture", "review", "findings"] as const;
 
 /** One axis: what it does and what moves it, what sets it up, and what measures it. */
 export function AxisRoom() {

@@ -1,13 +1,13 @@
 import { Center, Loader } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
-import { useEffect, useMemo } from "react";
+import { useMemo } from "react";
 import { sessionQuery, useDescriptionQuery, useTurbineQuery } from "../../api/queries";
 import type { DescriptionDoc } from "../../api/types";
 import { usePageSearch } from "../../frame/search";
 import { Unconnected } from "../../frame/Unconnected";
 import { useShown, useWatchDevice } from "../../live/live";
 import { useTexts } from "../../texts/texts";
-import { placesOf, type Place, stationName } from "../../ui/devices";
+import { placesOf, stationName } from "../../ui/devices";
 import { ProblemAlert } from "../../ui/ProblemAlert";
 import { type Bench, BenchContext, DeviceContextOfTable } from "./context";
 import { DevicePicker } from "./DevicePicker";
@@ -15,14 +15,8 @@ import { contextOf } from "./devicesOf";
 import { Dictionary } from "./Dictionary";
 import { useFavourites } from "./favourites";
 import classes from "./Parameters.module.css";
-import { PendingBar } from "./PendingBar";
-import { ReviewDialog } from "./ReviewDialog";
-import { ReplayLock } from "./ReplayLock";
-import { RuleButton, RuleOverview } from "./RuleOverview";
-import { JudgedContext, useJudged } from "./rules";
 import { type Selection, selectionOf } from "./selection";
-import { staged } from "./staging";
-import { useFinishWriting } from "./writing";
+import { StagedBar, StagedRoom } from "./StagedRoom";
 
 /** Picks the devices of the URL, or the first, and shows their dictionary. */
 export function ParametersPage() {
@@ -39,16 +33,9 @@ export function ParametersPage() {
     ...describe(selection?.kind.descriptionId ?? ""),
     enabled: selection !== null,
   });
-  const { recorded } = useShown();
-  const slug = turbine.data?.slug;
-  useEffect(() => {
-    if (slug !== undefined && !recorded) staged.open(slug);
-  }, [slug, recorded]);
-  useFinishWriting();
   const error = turbine.error ?? description.error;
-  const judged = useJudged(selection !== null && !recorded);
   return (
-    <JudgedContext value={judged}>
+    <StagedRoom>
       <div className={classes.page}>
         {selection && (
           <div className={classes.top}>
@@ -57,37 +44,29 @@ export function ParametersPage() {
               selection={selection}
               onPick={(device, side) => update({ device, view: side ? "side" : undefined })}
             />
-            {recorded ? <ReplayLock /> : <PendingBar />}
-            {!recorded && <RuleButton />}
+            <StagedBar />
           </div>
         )}
         {error && <ProblemAlert error={error} title={t("page.table.not_loaded")} />}
-        {selection && description.data && (
-          <Room places={places} selection={selection} doc={description.data} />
-        )}
+        {selection && description.data && <Room selection={selection} doc={description.data} />}
         {turbine.isSuccess && !turbine.data && <Unconnected />}
         {!error && turbine.data !== undefined && !description.data && (
           <Center h="60%">
             <Loader aria-label={t("page.loading")} />
           </Center>
         )}
-        {search.findings === "open" && !recorded && (
-          <RuleOverview places={places} onClose={() => update({ findings: undefined })} />
-        )}
       </div>
-    </JudgedContext>
+    </StagedRoom>
   );
 }
 
 interface RoomProps {
-  places: readonly Place[];
   selection: Selection;
   doc: DescriptionDoc;
 }
 
-function Room({ places, selection, doc }: RoomProps) {
+function Room({ selection, doc }: RoomProps) {
   const t = useTexts();
-  const [search, update] = usePageSearch();
   const role = useQuery(sessionQuery).data?.role ?? "viewer";
   const { starred, toggleStar } = useFavourites(doc.id);
   const { kind, active, side } = selection;
@@ -123,9 +102,6 @@ function Room({ places, selection, doc }: RoomProps) {
           <Watch key={slug} slug={slug} />
         ))}
         <Dictionary key={side ? doc.id : activeSlug} />
-        {search.review === "open" && !recorded && (
-          <ReviewDialog places={places} onClose={() => update({ review: undefined })} />
-        )}
       </DeviceContextOfTable>
     </BenchContext>
   );

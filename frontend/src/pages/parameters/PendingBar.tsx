@@ -1,9 +1,10 @@
 import { Button, Menu } from "@mantine/core";
-import { IconArrowBackUp, IconPencilCheck } from "@tabler/icons-react";
+import { IconArrowBackUp, IconPencilCheck, IconTrash } from "@tabler/icons-react";
 import { usePageSearch } from "../../frame/search";
-import type { UndoSet } from "../../model/staged";
+import { type Change, keyOf, type UndoSet } from "../../model/staged";
 import { useTexts } from "../../texts/texts";
 import { timeOfDay } from "../../ui/format";
+import { notify } from "../../ui/notices";
 import classes from "./Parameters.module.css";
 import { staged, useStaged } from "./staging";
 import { useWriting } from "./writing";
@@ -30,12 +31,38 @@ export function PendingBar() {
         </span>
       )}
       {undo.length > 0 && !running && <UndoMenu sets={undo} />}
+      {changes.size > 0 && !running && <Discard changes={[...changes.values()]} />}
       {(changes.size > 0 || running) && (
         <Button leftSection={<IconPencilCheck size={17} aria-hidden />} onClick={review} data-testid="review">
           {t(running ? "page.review.show" : "page.review.open")}
         </Button>
       )}
     </div>
+  );
+}
+
+/** Takes all that is pending out; a notice offers to bring it back. */
+function Discard({ changes }: { changes: readonly Change[] }) {
+  const t = useTexts();
+  const discard = () => {
+    staged.drop(changes.map((one) => keyOf(one.device, one.address)));
+    notify({
+      tone: "ok",
+      title: t("page.review.discarded", { count: changes.length }),
+      lines: [],
+      action: { label: t("page.review.discard_undo"), run: () => staged.stage(changes) },
+    });
+  };
+  return (
+    <Button
+      variant="subtle"
+      px="sm"
+      leftSection={<IconTrash size={17} aria-hidden />}
+      onClick={discard}
+      data-testid="discard"
+    >
+      {t("page.review.discard")}
+    </Button>
   );
 }
 

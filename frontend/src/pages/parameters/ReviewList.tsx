@@ -1,8 +1,9 @@
 import { ActionIcon, Alert, Button, Checkbox, Group, SegmentedControl, Stack, Text } from "@mantine/core";
 import { IconArrowRight, IconTrash } from "@tabler/icons-react";
+import { useQuery } from "@tanstack/react-query";
 import { useContext, useState } from "react";
+import { sessionQuery } from "../../api/queries";
 import type { Raw, WritesRequest } from "../../api/types";
-import { usePageSearch } from "../../frame/search";
 import { useDeviceVersion, useWatchDevice } from "../../live/live";
 import { asks, FindingKind, planOf, type PlannedRow, stops } from "../../model/findings";
 import { titleOf } from "../../model/rows";
@@ -12,7 +13,6 @@ import { type Change, keyOf } from "../../model/staged";
 import { useTexts } from "../../texts/texts";
 import { type Place, useDeviceName } from "../../ui/devices";
 import { HoldButton } from "../../ui/HoldButton";
-import { useBenchOfTable } from "./context";
 import { useContexts } from "./devicesOf";
 import { FindingList } from "./FindingList";
 import { RuleFindingList } from "./RuleFindingList";
@@ -20,6 +20,7 @@ import { JudgedContext } from "./rules";
 import classes from "./Parameters.module.css";
 import { entriesOf, groundOf, plannedContext, staged, useStaged } from "./staging";
 import { useSilent } from "./silent";
+import { useOpenParameter } from "./useOpenParameter";
 import { reasonOf } from "./ValueCell";
 import { useWrite } from "./writing";
 
@@ -104,7 +105,7 @@ export function ReviewList({ places, onClose }: { places: readonly Place[]; onCl
 
 function usePlans(places: readonly Place[]): DevicePlan[] {
   const { changes } = useStaged();
-  const { role } = useBenchOfTable();
+  const role = useQuery(sessionQuery).data?.role ?? "viewer";
   const contexts = useContexts(places);
   const bySlug = new Map<string, Change[]>();
   for (const change of changes.values())
@@ -124,7 +125,7 @@ function usePlans(places: readonly Place[]): DevicePlan[] {
 /** What the rules find at the pending objects once all of them were written. It forbids nothing: a person decides. */
 function RulesOfReview() {
   const t = useTexts();
-  const [, update] = usePageSearch();
+  const open = useOpenParameter();
   const { changes } = useStaged();
   const { stations } = useContext(JudgedContext);
   const findings = touching(
@@ -137,10 +138,7 @@ function RulesOfReview() {
       <Text size="sm" fw={650} mb={6}>
         {t("page.rules.review", { count: findings.length })}
       </Text>
-      <RuleFindingList
-        findings={findings}
-        onJump={(device, edit) => update({ device, edit, review: undefined, q: undefined })}
-      />
+      <RuleFindingList findings={findings} onJump={open} />
     </section>
   );
 }

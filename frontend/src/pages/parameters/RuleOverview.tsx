@@ -14,6 +14,7 @@ import { useTexts } from "../../texts/texts";
 import { type Place, stationName } from "../../ui/devices";
 import { RuleFindingList } from "./RuleFindingList";
 import { JudgedContext } from "./rules";
+import { useOpenParameter } from "./useOpenParameter";
 import classes from "./Rules.module.css";
 import { Dialog } from "../../ui/Dialog";
 
@@ -64,9 +65,8 @@ function Counts({ findings }: { findings: readonly RuleFinding[] }) {
 /** What the rules say of every station of the turbine, with all that is pending. */
 export function RuleOverview({ places, onClose }: { places: readonly Place[]; onClose: () => void }) {
   const t = useTexts();
-  const [, update] = usePageSearch();
+  const jump = useOpenParameter();
   const { stations, error } = useContext(JudgedContext);
-  const jump = (device: string, edit: string) => update({ device, edit, findings: undefined, q: undefined });
   return (
     <Dialog
       opened

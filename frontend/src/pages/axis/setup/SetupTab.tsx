@@ -8,7 +8,9 @@ import { useTexts } from "../../../texts/texts";
 import { useDeviceContext } from "../../../ui/reading";
 import classes from "../Axis.module.css";
 import { BladeStrip } from "../BladeStrip";
+import room from "../../../ui/Room.module.css";
 import { PMC, PMM } from "../../overview/layout";
+import { StagedBar, StagedRoom } from "../../parameters/StagedRoom";
 
 /** What a picture is drawn of: the two units of a blade, as far as the station has them. */
 export interface PictureProps {
@@ -23,11 +25,13 @@ const PICTURES: Readonly<Record<string, ComponentType<PictureProps>>> = {};
 /** The pictures that set up an axis; what is changed in one is staged, and written from the review of all changes. */
 export function SetupTab() {
   return (
-    <div className={classes.page}>
-      <BladeStrip now={() => <Choice />}>
-        {(station) => <Picture key={station.slug} station={station} />}
-      </BladeStrip>
-    </div>
+    <StagedRoom>
+      <div className={classes.page}>
+        <BladeStrip now={() => <Choice />}>
+          {(station) => <Picture key={station.slug} station={station} />}
+        </BladeStrip>
+      </div>
+    </StagedRoom>
   );
 }
 
@@ -41,14 +45,21 @@ function useChosen(): string | undefined {
 function Choice() {
   const t = useTexts();
   const [, update] = usePageSearch();
+  const chosen = useChosen();
   return (
-    <SegmentedControl
-      value={useChosen() ?? ""}
-      onChange={(chosen) => update({ picture: chosen === names[0] ? undefined : chosen })}
-      data={names.map((one) => ({ value: one, label: t(`page.setup.picture.${one}`) }))}
-      aria-label={t("page.setup.choose")}
-      data-testid="choose-picture"
-    />
+    <>
+      {chosen !== undefined && (
+        <SegmentedControl
+          value={chosen}
+          onChange={(one) => update({ picture: one === names[0] ? undefined : one })}
+          data={names.map((one) => ({ value: one, label: t(`page.setup.picture.${one}`) }))}
+          aria-label={t("page.setup.choose")}
+          data-testid="choose-picture"
+        />
+      )}
+      <span className={room.spacer} />
+      <StagedBar />
+    </>
   );
 }
 
