@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
-from math import cos, pi, sin, sqrt
+from math import pi, sqrt
 from typing import Final, NoReturn
 
 import numpy as np
@@ -92,41 +92,38 @@ class Signal:
 
     def offset_deg(self, t_s: float) -> float:
         """Where the target is at ``t_s``, from where the blade stood."""
+        return float(self.offsets_deg(np.array([t_s]))[0])
+
+    def offsets_deg(self, times_s: Curve) -> Curve:
+        """The same of many times at once: an event loop that moves an axis must not be held up."""
         begin_s, end_s = self.steady_s
         if self.shape is Shape.SINE:
-            return self.amplitude_deg * self._envelope(t_s) * sin(2 * pi * self.frequency_hz * (t_s - begin_s))
-        if not begin_s <= t_s < end_s:
-            return 0.0
-        within_s = (t_s - begin_s) % self.cycle_s
+            outside_s = np.maximum(np.maximum(begin_s - times_s, times_s - end_s), 0.0)
+            envelope = 0.5 + 0.5 * np.cos(pi * np.minimum(outside_s / self.fade_s, 1.0))
+            sine: Curve = self.amplitude_deg * envelope * np.sin(2 * pi * self.frequency_hz * (times_s - begin_s))
+            return sine
+        within_s = (times_s - begin_s) % self.cycle_s
         if self.shape is Shape.STEP:
-            return self.amplitude_deg if within_s < self.hold_s else 0.0
-        up = _way(within_s, self.leg_s)
-        down = _way(within_s - self.leg_s - self.hold_s, self.leg_s)
-        return self.amplitude_deg * (up - down)
-
-    def _envelope(self, t_s: float) -> float:
-        begin_s, end_s = self.steady_s
-        outside_s = max(begin_s - t_s, t_s - end_s, 0.0)
-        return 0.5 + 0.5 * cos(pi * min(outside_s / self.fade_s, 1.0))
+            share = np.where(within_s < self.hold_s, 1.0, 0.0)
+        else:
+            share = _way(within_s, self.leg_s) - _way(within_s - self.leg_s - self.hold_s, self.leg_s)
+        offsets: Curve = np.where((times_s >= begin_s) & (times_s < end_s), self.amplitude_deg * share, 0.0)
+        return offsets
 
     def course(self, step_s: float = _GRID_S) -> tuple[Curve, Curve]:
         """Times in s and offsets in degrees, every ``step_s``."""
         times = np.arange(0.0, self.duration_s + step_s, step_s)
-        return times, np.array([self.offset_deg(t_s) for t_s in times.tolist()])
+        return times, self.offsets_deg(times)
 
 
-def _way(t_s: float, leg_s: float) -> float:
+def _way(times_s: Curve, leg_s: float) -> Curve:
     """The share of a ramp's way, 0 to 1: accelerated for ``CORNER_S``, even, slowed down."""
-    if t_s <= 0.0:
-        return 0.0
-    if t_s >= leg_s:
-        return 1.0
+    t_s = np.clip(times_s, 0.0, leg_s)
     even_s = leg_s - CORNER_S
-    if t_s < CORNER_S:
-        return t_s * t_s / (2 * CORNER_S * even_s)
-    if t_s <= even_s:
-        return (t_s - CORNER_S / 2) / even_s
-    return 1.0 - (leg_s - t_s) ** 2 / (2 * CORNER_S * even_s)
+    begin = t_s**2 / (2 * CORNER_S * even_s)
+    end = 1.0 - (leg_s - t_s) ** 2 / (2 * CORNER_S * even_s)
+    share: Curve = np.select([t_s < CORNER_S, t_s <= even_s], [begin, (t_s - CORNER_S / 2) / even_s], end)
+    return share
 
 
 @dataclass(frozen=True, slots=True)
