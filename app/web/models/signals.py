@@ -142,7 +142,7 @@ class CourseDoc(BaseModel):
     y: list[float]
 
 
-class SignalLine(BaseModel):
+class SignalRunLine(BaseModel):
     """A run in the list. ``why`` is the end of a text key ``motion.ended``."""
 
     id: str
@@ -155,12 +155,12 @@ class SignalLine(BaseModel):
     results: SignalResults
 
     @classmethod
-    def of(cls, run: SignalRun) -> SignalLine:
+    def of(cls, run: SignalRun) -> SignalRunLine:
         """The line of a run."""
         return cls.model_validate({**run.content, **_head(run)})
 
 
-class SignalDoc(SignalLine):
+class SignalRunDoc(SignalRunLine):
     """A run with its courses: demand, set_point, position, expected, following (degrees), velocity, current (%)."""
 
     transport: Literal["pdo", "sdo"]
@@ -174,7 +174,7 @@ class SignalDoc(SignalLine):
     courses: dict[str, CourseDoc]
 
     @classmethod
-    def of(cls, run: SignalRun) -> SignalDoc:
+    def of(cls, run: SignalRun) -> SignalRunDoc:
         """The document of a run."""
         return cls.model_validate({**run.content, **_head(run)})
 

@@ -10,7 +10,7 @@ from app.errors import NotConnectedError
 from app.model.roles import Role
 from app.service.motion.probe import ProbeLine, Probes
 from app.web.deps import BenchOf, JournalOf, PersonOf, TargetOf, needs
-from app.web.models.signals import SignalDoc, SignalLine, SignalRequest
+from app.web.models.signals import SignalRunDoc, SignalRunLine, SignalRequest
 from app.web.routes.motion import MOTION, DeskOf
 
 router = APIRouter()
@@ -30,23 +30,23 @@ ProbesOf = Annotated[Probes, Depends(get_probes)]
 @router.post(MOTION + "/signal", dependencies=[TECHNICIAN])
 async def signal(
     bench: BenchOf, desk: DeskOf, target: TargetOf, journal: JournalOf, person: PersonOf, request: SignalRequest
-) -> SignalDoc:
+) -> SignalRunDoc:
     """Run a test signal (mode 8) as long as it is held, and keep what came of it, whatever ended it."""
     desk.admit(request.fence, request.order)
     runs = bench.office.signal_runs
-    return SignalDoc.of(await runs.run(desk, target.slug, request.fence, request.wanted(), person.person, journal))
+    return SignalRunDoc.of(await runs.run(desk, target.slug, request.fence, request.wanted(), person.person, journal))
 
 
 @router.get(MOTION + "/signals")
-async def signals(bench: BenchOf, target: TargetOf) -> list[SignalLine]:
+async def signals(bench: BenchOf, target: TargetOf) -> list[SignalRunLine]:
     """The latest runs of a device, newest first."""
-    return [SignalLine.of(run) for run in await bench.office.signal_runs.of(target.slug)]
+    return [SignalRunLine.of(run) for run in await bench.office.signal_runs.of(target.slug)]
 
 
 @router.get("/signals/{run_id}")
-async def signal_run(bench: BenchOf, run_id: str) -> SignalDoc:
+async def signal_run(bench: BenchOf, run_id: str) -> SignalRunDoc:
     """One run with its courses; 404 ``signal_unknown``."""
-    return SignalDoc.of(await bench.office.signal_runs.get(run_id))
+    return SignalRunDoc.of(await bench.office.signal_runs.get(run_id))
 
 
 @router.get(MOTION + "/probe")

@@ -7966,10 +7966,81 @@ export interface components {
          */
         SignKind: "emcy" | "emcy_reset" | "error_code" | "boot_up" | "nmt_command" | "write_aborted" | "parameter_written" | "gap" | "axis_fault" | "axis_warning" | "axis_enabled" | "quick_stop" | "remote_lost" | "internal_limit" | "following_error" | "efc_command" | "efc_input" | "enable_input" | "limit_switch" | "feather_switch" | "watchdog_open" | "chain_open" | "relay_open" | "pmm_fault" | "pmm_warning" | "battery_fault" | "battery_test" | "on_battery" | "mains_high" | "mains_phase" | "mains_low" | "booster" | "hold_up_over" | "device_status" | "limit" | "silent" | "not_operational";
         /**
-         * SignalDoc
+         * SignalLine
+         * @description One object of a device that is a number, as it was seen in the recording.
+         *
+         *     ``low`` and ``high`` are in ``unit``; ``states`` are text keys of an enumeration's values, None where it has none.
+         *     ``changes`` counts the values that differed from the one before.
+         */
+        SignalLine: {
+            /** Address */
+            address: string;
+            /** Changes */
+            changes: number;
+            /** Count */
+            count: number;
+            /** Device */
+            device: string;
+            /** First S */
+            first_s: number;
+            /** High */
+            high: number;
+            /** Last S */
+            last_s: number;
+            /** Low */
+            low: number;
+            /** Name */
+            name: string;
+            /** States */
+            states: {
+                [key: string]: string;
+            } | null;
+            /** Sub */
+            sub: string | null;
+            /** Unit */
+            unit: string;
+        };
+        /**
+         * SignalRequest
+         * @description Run a test signal while it is held.
+         * @example {
+         *       "fence": 1764029382123456,
+         *       "order": 5,
+         *       "signal": {
+         *         "amplitude_deg": 1,
+         *         "cycles": 3,
+         *         "frequency_hz": 0.5,
+         *         "hold_s": 1,
+         *         "shape": "sine",
+         *         "speed_dps": 2
+         *       }
+         *     }
+         */
+        SignalRequest: {
+            /** Fence */
+            fence: number;
+            /** Order */
+            order: number;
+            signal: components["schemas"]["SignalSettings"];
+        };
+        /**
+         * SignalResults
+         * @description What the response says; None where it does not show it.
+         */
+        SignalResults: {
+            /** Lag Ms */
+            lag_ms: number | null;
+            /** Most Following Deg */
+            most_following_deg: number | null;
+            ramp: components["schemas"]["RampDoc"] | null;
+            sine: components["schemas"]["SineDoc"] | null;
+            step: components["schemas"]["StepDoc"] | null;
+        };
+        /**
+         * SignalRunDoc
          * @description A run with its courses: demand, set_point, position, expected, following (degrees), velocity, current (%).
          */
-        SignalDoc: {
+        SignalRunDoc: {
             /** Courses */
             courses: {
                 [key: string]: components["schemas"]["CourseDoc"];
@@ -8008,40 +8079,24 @@ export interface components {
             why: string;
         };
         /**
-         * SignalRequest
-         * @description Run a test signal while it is held.
-         * @example {
-         *       "fence": 1764029382123456,
-         *       "order": 5,
-         *       "signal": {
-         *         "amplitude_deg": 1,
-         *         "cycles": 3,
-         *         "frequency_hz": 0.5,
-         *         "hold_s": 1,
-         *         "shape": "sine",
-         *         "speed_dps": 2
-         *       }
-         *     }
+         * SignalRunLine
+         * @description A run in the list. ``why`` is the end of a text key ``motion.ended``.
          */
-        SignalRequest: {
-            /** Fence */
-            fence: number;
-            /** Order */
-            order: number;
+        SignalRunLine: {
+            /** Device */
+            device: string;
+            /** Error */
+            error: string | null;
+            /** Id */
+            id: string;
+            /** Person */
+            person: string;
+            results: components["schemas"]["SignalResults"];
             signal: components["schemas"]["SignalSettings"];
-        };
-        /**
-         * SignalResults
-         * @description What the response says; None where it does not show it.
-         */
-        SignalResults: {
-            /** Lag Ms */
-            lag_ms: number | null;
-            /** Most Following Deg */
-            most_following_deg: number | null;
-            ramp: components["schemas"]["RampDoc"] | null;
-            sine: components["schemas"]["SineDoc"] | null;
-            step: components["schemas"]["StepDoc"] | null;
+            /** T Ns */
+            t_ns: number;
+            /** Why */
+            why: string;
         };
         /**
          * SignalSettings
@@ -9135,61 +9190,6 @@ export interface components {
             expected_raw?: number | string | null;
             /** Raw */
             raw: number | string;
-        };
-        /**
-         * SignalLine
-         * @description One object of a device that is a number, as it was seen in the recording.
-         *
-         *     ``low`` and ``high`` are in ``unit``; ``states`` are text keys of an enumeration's values, None where it has none.
-         *     ``changes`` counts the values that differed from the one before.
-         */
-        app__service__replay__views__SignalLine: {
-            /** Address */
-            address: string;
-            /** Changes */
-            changes: number;
-            /** Count */
-            count: number;
-            /** Device */
-            device: string;
-            /** First S */
-            first_s: number;
-            /** High */
-            high: number;
-            /** Last S */
-            last_s: number;
-            /** Low */
-            low: number;
-            /** Name */
-            name: string;
-            /** States */
-            states: {
-                [key: string]: string;
-            } | null;
-            /** Sub */
-            sub: string | null;
-            /** Unit */
-            unit: string;
-        };
-        /**
-         * SignalLine
-         * @description A run in the list. ``why`` is the end of a text key ``motion.ended``.
-         */
-        app__web__models__signals__SignalLine: {
-            /** Device */
-            device: string;
-            /** Error */
-            error: string | null;
-            /** Id */
-            id: string;
-            /** Person */
-            person: string;
-            results: components["schemas"]["SignalResults"];
-            signal: components["schemas"]["SignalSettings"];
-            /** T Ns */
-            t_ns: number;
-            /** Why */
-            why: string;
         };
     };
     responses: never;
@@ -13009,7 +13009,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": components["schemas"]["SignalDoc"];
+                    "application/json": components["schemas"]["SignalRunDoc"];
                 };
             };
             /** @description Unauthorized */
@@ -13114,7 +13114,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": components["schemas"]["app__web__models__signals__SignalLine"][];
+                    "application/json": components["schemas"]["SignalRunLine"][];
                 };
             };
             /** @description Unauthorized */
@@ -18969,7 +18969,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": components["schemas"]["app__service__replay__views__SignalLine"][];
+                    "application/json": components["schemas"]["SignalLine"][];
                 };
             };
             /** @description Unauthorized */
@@ -20740,7 +20740,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": components["schemas"]["SignalDoc"];
+                    "application/json": components["schemas"]["SignalRunDoc"];
                 };
             };
             /** @description Unauthorized */

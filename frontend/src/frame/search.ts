@@ -42,6 +42,9 @@ export interface PageSearch {
   span?: string;
   /** The picture of the setting up that is open. */
   picture?: string;
+  /** The run of a test signal that is shown, and the one that is laid over it. */
+  run?: string;
+  over?: string;
   /** Name of the recording or set that is open. */
   file?: string;
   /** Filter, order (column, minus sign where descending) and hidden columns of the tables of files, sets and the bus. */
@@ -120,6 +123,8 @@ const TEXTS = [
   "camera",
   "span",
   "picture",
+  "run",
+  "over",
   "file",
   "find",
   "order",

@@ -8,6 +8,8 @@ import { HomeSection } from "./HomeSection";
 import { Interlocks } from "./Interlocks";
 import { MoveSection } from "./MoveSection";
 import { PrepareSection } from "./PrepareSection";
+import { ProbeSection } from "./ProbeSection";
+import { SignalSection } from "./SignalSection";
 
 /** Moving the blade from here: control, what holds it back, the proof that it stops, then hold to run. */
 export function MotionPanel({ device }: { device: DeviceRef }) {
@@ -29,6 +31,8 @@ export function MotionPanel({ device }: { device: DeviceRef }) {
           <HomeSection device={device.slug} />
         </div>
         <MoveSection device={device.slug} />
+        <SignalSection device={device.slug} />
+        <ProbeSection device={device.slug} />
       </div>
       <p className={motion.plain}>{t("page.motion.no_safety")}</p>
     </section>

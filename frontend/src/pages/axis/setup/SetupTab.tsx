@@ -1,5 +1,5 @@
 import { SegmentedControl } from "@mantine/core";
-import { type ComponentType, Suspense } from "react";
+import { type ComponentType, lazy, Suspense } from "react";
 import type { StationRef } from "../../../api/types";
 import { usePageSearch } from "../../../frame/search";
 import { useWatchDevice } from "../../../live/live";
@@ -20,7 +20,9 @@ export interface PictureProps {
 }
 
 /** Each comes when it is looked at; the first one needs no mention in the address. */
-const PICTURES: Readonly<Record<string, ComponentType<PictureProps>>> = {};
+const PICTURES: Readonly<Record<string, ComponentType<PictureProps>>> = {
+  controller: lazy(async () => ({ default: (await import("./ControllerPicture")).ControllerPicture })),
+};
 
 /** The pictures that set up an axis; what is changed in one is staged, and written from the review of all changes. */
 export function SetupTab() {
