@@ -90,7 +90,7 @@ function TemperatureLine({ spot, context }: { spot: Temperature; context: Device
   );
 }
 
-function sensorWords(raw: number, t: (key: string) => string): string | null {
+export function sensorWords(raw: number, t: (key: string) => string): string | null {
   if (raw === SENSOR_OPEN) return t("page.temperature.not_connected");
   return raw === SENSOR_SHORT ? t("page.temperature.short_circuit") : null;
 }

@@ -1,8 +1,9 @@
 import { ActionIcon, Alert, Button, Checkbox, Group, SegmentedControl, Stack, Text } from "@mantine/core";
 import { IconArrowRight, IconTrash } from "@tabler/icons-react";
 import { useQuery } from "@tanstack/react-query";
-import { useContext, useState } from "react";
+import { useContext, useMemo, useState } from "react";
 import { sessionQuery } from "../../api/queries";
+import { type WritesPlan, writesPlanQuery } from "../../api/writes";
 import type { Raw, WritesRequest } from "../../api/types";
 import { useDeviceVersion, useWatchDevice } from "../../live/live";
 import { asks, FindingKind, planOf, type PlannedRow, stops } from "../../model/findings";
@@ -15,6 +16,7 @@ import { type Place, useDeviceName } from "../../ui/devices";
 import { HoldButton } from "../../ui/HoldButton";
 import { useContexts } from "./devicesOf";
 import { FindingList } from "./FindingList";
+import { ReviewOrder } from "./ReviewOrder";
 import { RuleFindingList } from "./RuleFindingList";
 import { JudgedContext } from "./rules";
 import classes from "./Parameters.module.css";
@@ -33,13 +35,23 @@ interface DevicePlan {
 /** Everything that is pending, device by device in the order in which it will be written. */
 export function ReviewList({ places, onClose }: { places: readonly Place[]; onClose: () => void }) {
   const t = useTexts();
-  const plans = usePlans(places);
+  const [accepted, setAccepted] = useState(false);
+  const planned = usePlans(places);
+  const order = useQuery(
+    writesPlanQuery(
+      planned.flatMap((plan) => plan.rows.map((row) => row.change)),
+      accepted,
+    ),
+  );
+  const turns = useMemo(() => turnsOf(order.data), [order.data]);
+  const plans = planned.map((plan) => ({ ...plan, rows: inTurn(plan.rows, turns) }));
   const write = useWrite();
   const [noSave, setNoSave] = useState<ReadonlySet<string>>(new Set());
   const [onFailure, setOnFailure] = useState<WritesRequest["on_failure"]>("stop");
   const rows = plans.flatMap((plan) => plan.rows);
   const stopped = rows.filter(stops).length + plans.filter((one) => !one.context).length;
   const asked = rows.filter(asks).length;
+  const unordered = (order.data?.unordered.length ?? 0) > 0;
   const save = plans.filter((one) => !noSave.has(one.slug)).map((one) => one.slug);
   const toggleSave = (slug: string) => {
     const next = new Set(noSave);
@@ -56,6 +68,7 @@ export function ReviewList({ places, onClose }: { places: readonly Place[]; onCl
         <DeviceBlock
           key={plan.slug}
           plan={plan}
+          turns={turns}
           save={!noSave.has(plan.slug)}
           onSave={() => toggleSave(plan.slug)}
         />
@@ -74,6 +87,7 @@ export function ReviewList({ places, onClose }: { places: readonly Place[]; onCl
         />
       </Group>
       <RulesOfReview />
+      <ReviewOrder plan={order.data} accepted={accepted} onAccept={setAccepted} />
       <Blocked stopped={stopped} asked={asked} />
       <Group justify="space-between">
         <Button
@@ -91,8 +105,8 @@ export function ReviewList({ places, onClose }: { places: readonly Place[]; onCl
           <HoldButton
             tone="accent"
             hint={t("page.hold")}
-            disabled={stopped > 0 || asked > 0 || write.isPending}
-            onHeld={() => write.mutate({ changes: rows.map((row) => row.change), save, onFailure })}
+            disabled={stopped > 0 || asked > 0 || unordered || order.isPending || write.isPending}
+            onHeld={() => write.mutate({ changes: rows.map((row) => row.change), save, onFailure, accepted })}
             testId="write-hold"
           >
             {t("page.review.write", { count: rows.length, devices: plans.length })}
@@ -102,6 +116,22 @@ export function ReviewList({ places, onClose }: { places: readonly Place[]; onCl
     </Stack>
   );
 }
+
+/** The turn of each row in the whole batch, from 1. */
+type Turns = ReadonlyMap<string, number>;
+
+const turnsOf = (plan: WritesPlan | undefined): Turns =>
+  new Map((plan?.rows ?? []).map(({ device, address }, at) => [keyOf(device, address), at + 1]));
+
+const turnOf = ({ change }: PlannedRow, turns: Turns): number =>
+  turns.get(keyOf(change.device, change.address)) ?? Infinity;
+
+/** Rows by their turns; those that have none keep their places at the end. */
+const inTurn = (rows: readonly PlannedRow[], turns: Turns): PlannedRow[] =>
+  rows.toSorted((a, b) => {
+    const [first, second] = [turnOf(a, turns), turnOf(b, turns)];
+    return first === second ? 0 : first - second;
+  });
 
 function usePlans(places: readonly Place[]): DevicePlan[] {
   const { changes } = useStaged();
@@ -168,7 +198,14 @@ function Blocked({ stopped, asked }: { stopped: number; asked: number }) {
   );
 }
 
-function DeviceBlock({ plan, save, onSave }: { plan: DevicePlan; save: boolean; onSave: () => void }) {
+interface BlockProps {
+  plan: DevicePlan;
+  turns: Turns;
+  save: boolean;
+  onSave: () => void;
+}
+
+function DeviceBlock({ plan, turns, save, onSave }: BlockProps) {
   const t = useTexts();
   const name = useDeviceName()(plan.slug);
   const silent = useSilent(plan.slug);
@@ -194,14 +231,20 @@ function DeviceBlock({ plan, save, onSave }: { plan: DevicePlan; save: boolean; 
       )}
       <ol>
         {plan.rows.map((row) => (
-          <ReviewRow key={row.change.address} row={row} context={plan.context} />
+          <ReviewRow key={row.change.address} row={row} turn={turnOf(row, turns)} context={plan.context} />
         ))}
       </ol>
     </section>
   );
 }
 
-function ReviewRow({ row, context }: { row: PlannedRow; context: DeviceContext | undefined }) {
+interface RowProps {
+  row: PlannedRow;
+  turn: number;
+  context: DeviceContext | undefined;
+}
+
+function ReviewRow({ row, turn, context }: RowProps) {
   const t = useTexts();
   const { change, findings } = row;
   const key = keyOf(change.device, change.address);
@@ -218,6 +261,13 @@ function ReviewRow({ row, context }: { row: PlannedRow; context: DeviceContext |
   return (
     <li className={classes.reviewRow} data-testid={`review-row-${change.address}`}>
       <div className={classes.reviewLine}>
+        <span
+          className={classes.turn}
+          title={t("page.review.order.turn")}
+          data-testid={`turn-${change.address}`}
+        >
+          {Number.isFinite(turn) ? `${turn}.` : "–"}
+        </span>
         <span className={classes.address}>{change.address}</span>
         <span className={classes.reviewName}>{titleOf(entry, t)}</span>
         <span className={classes.reviewValues}>

@@ -14,6 +14,8 @@ export interface Order {
   changes: readonly Change[];
   save: string[];
   onFailure: WritesRequest["on_failure"];
+  /** Rules that hold at every step may be broken where they are in the end. */
+  accepted: boolean;
 }
 
 export interface Writing {
@@ -46,11 +48,12 @@ export function useFinishWriting(): void {
 export function useWrite() {
   const t = useTexts();
   return useMutation({
-    mutationFn: ({ changes, save, onFailure }: Order) =>
+    mutationFn: ({ changes, save, onFailure, accepted }: Order) =>
       commands.writes({
         rows: changes.map(({ device, address, raw, from }) => ({ device, address, raw, expected_raw: from })),
         save,
         on_failure: onFailure,
+        accepted,
       }),
     onSuccess: (job, { changes }) => {
       queryClient.setQueryData(["job", job.id], job);

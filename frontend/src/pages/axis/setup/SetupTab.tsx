@@ -21,6 +21,9 @@ export interface PictureProps {
 
 /** Each comes when it is looked at; the first one needs no mention in the address. */
 const PICTURES: Readonly<Record<string, ComponentType<PictureProps>>> = {
+  temperatures: lazy(async () => ({ default: (await import("./temperatures/Temperatures")).Temperatures })),
+  masks: lazy(async () => ({ default: (await import("./masks/Masks")).Masks })),
+  ladder: lazy(async () => ({ default: (await import("./ladder/Ladder")).Ladder })),
   controller: lazy(async () => ({ default: (await import("./ControllerPicture")).ControllerPicture })),
 };
 
