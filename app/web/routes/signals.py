@@ -10,7 +10,7 @@ from app.errors import NotConnectedError
 from app.model.roles import Role
 from app.service.motion.probe import ProbeLine, Probes
 from app.web.deps import BenchOf, JournalOf, PersonOf, TargetOf, needs
-from app.web.models.signals import SignalRunDoc, SignalRunLine, SignalRequest
+from app.web.models.signals import SignalRequest, SignalRunDoc, SignalRunLine
 from app.web.routes.motion import MOTION, DeskOf
 
 router = APIRouter()
