@@ -245,6 +245,7 @@ BRINGS_BYTES: Final = {("POST", "/api/recordings/import"), ("POST", "/api/incide
 """To these a file is sent as it is."""
 
 PLACES: Final = {
+    "{run_id}": "0197a000-0000-7000-8000-000000000001",
     "{turbine}": "wtg-07",
     "{station}": "blade-1",
     "{device}": "pmc",
