@@ -40,7 +40,8 @@ def test_the_first_capture_after_arming_is_marked_and_stays() -> None:
     looks = Looks(Probe())
     looks.look(False, 0, 0)
     looks.look(True, 4500, 0)
-    assert looks.probe.first is None, "it was not armed"
+    before = looks.probe.first
+    assert before is None, "it was not armed"
     looks.probe.arm(looks.t_ns + 1)
     looks.look(False, 4500, 4510)
     looks.look(True, 4620, 4510)

@@ -20,7 +20,7 @@ export function RunResults({ run }: { run: SignalRun }) {
           </Row>
         ))}
       </dl>
-      <details>
+      <details className={classes.inForce}>
         <summary>{t("page.signal.in_force")}</summary>
         <dl className={classes.facts}>
           {run.in_force.map(({ address, name, shown, unit }) => (
