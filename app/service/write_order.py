@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from app.drivers.contract import Driver
 from app.errors import HubsideError
@@ -20,7 +20,7 @@ Device = tuple[Driver, Target]
 class KnownDevices:
     """What is known of the devices of a turbine while a batch is written to them."""
 
-    def __init__(self, targets: Sequence[Target], allow: Allow = Allow.NOTHING, accepted: bool = False) -> None:
+    def __init__(self, targets: Iterable[Target], allow: Allow = Allow.NOTHING, accepted: bool = False) -> None:
         self._targets = {target.slug: target for target in targets}
         self._values: dict[str, dict[Address, Raw]] = {slug: ram_of(one)[0] for slug, one in self._targets.items()}
         self._allow = allow

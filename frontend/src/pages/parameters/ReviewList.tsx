@@ -105,7 +105,7 @@ export function ReviewList({ places, onClose }: { places: readonly Place[]; onCl
           <HoldButton
             tone="accent"
             hint={t("page.hold")}
-            disabled={stopped > 0 || asked > 0 || unordered || order.isPending || write.isPending}
+            disabled={stopped > 0 || asked > 0 || unordered || write.isPending}
             onHeld={() => write.mutate({ changes: rows.map((row) => row.change), save, onFailure, accepted })}
             testId="write-hold"
           >

@@ -17,23 +17,19 @@ interface Props {
  */
 export function ReviewOrder({ plan, accepted, onAccept }: Props) {
   const t = useTexts();
-  if (!plan) return null;
-  const none = plan.unordered.length > 0;
+  const none = (plan?.unordered.length ?? 0) > 0;
+  const unknown = plan?.unknown.length ?? 0;
+  // Its place is kept before the order is known: the button below must not move away from the pointer.
   return (
-    <section data-testid="review-order">
-      {!none && plan.rows.length > 1 && (
-        <Text size="sm" className="dim">
+    <section className={classes.order} data-known={plan !== undefined} data-testid="review-order">
+      {!none && (
+        <Text size="sm" className="dim" data-testid={unknown > 0 ? "order-unknown" : undefined}>
           <IconListNumbers size={16} className={classes.inText} aria-hidden />{" "}
-          {t("page.review.order.numbered")}
+          {unknown > 0 ? t("page.review.order.unknown", { count: unknown }) : t("page.review.order.numbered")}
         </Text>
       )}
-      {plan.unknown.length > 0 && (
-        <Text size="sm" className="dim" data-testid="order-unknown">
-          {t("page.review.order.unknown", { count: plan.unknown.length })}
-        </Text>
-      )}
-      {none && <NoOrder plan={plan} />}
-      {(accepted || plan.broken.length > 0) && (
+      {plan && none && <NoOrder plan={plan} />}
+      {(accepted || (plan?.broken.length ?? 0) > 0) && (
         <Checkbox
           mt="xs"
           label={t("page.review.order.accept")}

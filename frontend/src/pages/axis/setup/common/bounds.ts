@@ -54,8 +54,8 @@ export interface Neighbour {
 /** Between two neighbours; one that is not known, or not there, holds nothing. */
 export function between(below: Neighbour | null, above: Neighbour | null): Bounds {
   return {
-    low: below === null || below.raw === null ? null : { raw: below.raw + below.gap, other: below.name },
-    high: above === null || above.raw === null ? null : { raw: above.raw - above.gap, other: above.name },
+    low: below?.raw == null ? null : { raw: below.raw + below.gap, other: below.name },
+    high: above?.raw == null ? null : { raw: above.raw - above.gap, other: above.name },
   };
 }
 

@@ -137,10 +137,10 @@ function StepRow({ steps, at, setup, pmm, pmc, scale, lines }: RowProps) {
             bounds={bounds}
           />
         </div>
+        <p className={classes.stopped} role="status" data-testid={`stopped-${step.address}`}>
+          {stopped && stopText(stopped.parameter, stopped.by, t)}
+        </p>
       </div>
-      <p className={classes.stopped} role="status" data-testid={`stopped-${step.address}`}>
-        {stopped && stopText(stopped.parameter, stopped.by, t)}
-      </p>
     </>
   );
 }

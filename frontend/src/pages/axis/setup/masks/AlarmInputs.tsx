@@ -1,7 +1,7 @@
 import { Button, SegmentedControl } from "@mantine/core";
 import type { DeviceContext } from "../../../../model/shown";
 import { hexadecimal } from "../../../../model/values";
-import { useTexts } from "../../../../texts/texts";
+import { type Translate, useTexts } from "../../../../texts/texts";
 import { useReading } from "../../../../ui/reading";
 import { Findings, findingsOf } from "../common/Findings";
 import { type Parameter, setRaw, type Setup } from "../common/parameter";
@@ -113,7 +113,7 @@ function AlarmRow({ number, parameter, bits, levels }: RowProps) {
       </Button>
       <div className={classes.words}>
         <strong data-testid={`alarm-words-${number}`}>
-          {useWords(alarm, bits, hexadecimal(entry, raw))}
+          {wordsOf(alarm, bits, hexadecimal(entry, raw), t)}
           {change && " ✎"}
         </strong>
         <Now alarm={ram === null ? null : alarmOf(ram, bits)} levels={levels} number={number} kind="now" />
@@ -124,8 +124,7 @@ function AlarmRow({ number, parameter, bits, levels }: RowProps) {
 }
 
 /** The mask in words, and as the device holds it. */
-function useWords(alarm: Alarm, bits: AlarmBits, hex: string): string {
-  const t = useTexts();
+function wordsOf(alarm: Alarm, bits: AlarmBits, hex: string, t: Translate): string {
   if (alarm.inputs.length === 0) return t("page.setup.masks.alarm.inactive", { hex });
   return t("page.setup.masks.alarm.words", {
     clamps: clampsOf(alarm, bits).join(" + "),

@@ -137,7 +137,7 @@ function Cell({ parameter, address, bit, place, current, given, onFocus }: CellP
     clamp: bit.clamp ?? "",
     function: `${t(`page.setup.masks.group.${index}`)}, ${t(`page.setup.masks.function.${keyOf(address)}`)}`,
   });
-  if (parameter === null || parameter.raw === null)
+  if (parameter?.raw == null)
     return (
       <td role="gridcell">
         <span className="dim">–</span>

@@ -104,11 +104,11 @@ export function ControllerRow({ lane, spot, unit, setup, scale, live }: Props) {
             />
           )}
         </div>
+        <p className={classes.stopped} role="status" data-testid={`stopped-${lane.index}`}>
+          {stopped && stopText(stopped.parameter, stopped.by, t)}
+        </p>
       </div>
       <Outputs lane={lane} masks={masks} />
-      <p className={classes.stopped} role="status" data-testid={`stopped-${lane.index}`}>
-        {stopped && stopText(stopped.parameter, stopped.by, t)}
-      </p>
       <Findings findings={findingsOf([...marks.map((one) => one.parameter), hysteresis])} />
     </>
   );
@@ -147,11 +147,14 @@ function Outputs({ lane, masks }: { lane: ControllerLane; masks: readonly (Param
   );
 }
 
-type Placed = { kind: MarkKind; parameter: Parameter };
+interface Placed {
+  kind: MarkKind;
+  parameter: Parameter;
+}
 
 /** From where each begins to where its hysteresis lets it end. */
 function bandsOf(marks: readonly Placed[], hysteresis: Parameter | null, t: (key: string) => string): Band[] {
-  if (hysteresis === null || hysteresis.raw === null) return [];
+  if (hysteresis?.raw == null) return [];
   const wide = scaled(hysteresis, hysteresis.raw);
   return marks.flatMap(({ kind, parameter }): Band[] => {
     if (parameter.raw === null) return [];

@@ -88,10 +88,10 @@ export function SupervisorRow({ lane, spot, unit, setup, scale, live, raw }: Pro
             />
           ))}
         </div>
+        <p className={classes.stopped} role="status" data-testid={`stopped-${lane.index}`}>
+          {stopped && stopText(stopped.parameter, stopped.by, t)}
+        </p>
       </div>
-      <p className={classes.stopped} role="status" data-testid={`stopped-${lane.index}`}>
-        {stopped && stopText(stopped.parameter, stopped.by, t)}
-      </p>
       <Findings findings={findingsOf(marks.map((one) => one.parameter))} />
     </>
   );

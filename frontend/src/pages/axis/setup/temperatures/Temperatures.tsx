@@ -54,7 +54,7 @@ function valuesOf(setup: Setup, pmm: Units["pmm"], pmc: Units["pmc"]): number[] 
         : [lane.heater, lane.cooler].filter((one) => one !== null);
     return addresses.flatMap((address) => {
       const parameter = setup.of(unit, address);
-      return parameter === null || parameter.raw === null ? [] : [scaled(parameter, parameter.raw)];
+      return parameter?.raw == null ? [] : [scaled(parameter, parameter.raw)];
     });
   });
 }
