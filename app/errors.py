@@ -79,6 +79,7 @@
     │   ├── PdoNoUndoError                  no change of PDOs that could be put back
     │   ├── BatteryConditionError           a condition of the battery test does not hold; names it
     │   ├── BatteryNotNotedError            the old battery was not noted before its change
+    │   ├── SignalUnknownError              no such run of a test signal
     │   ├── NoInstructorError               the connected turbine is none of the twins that we started
     │   └── FaultOrderError                 a fault that cannot be put into a twin so; names the field
     │       └── FaultValueError             one of its values is out of range; names the limits
@@ -587,6 +588,12 @@ class BatteryNotNotedError(RefusedError):
     """The old battery was not noted before its change. Details: device."""
 
     code = "battery_not_noted"
+
+
+class SignalUnknownError(RefusedError):
+    """No such run of a test signal. Details: run."""
+
+    code = "signal_unknown"
 
 
 class NoInstructorError(RefusedError):

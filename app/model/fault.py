@@ -122,6 +122,7 @@ _KINDS: Final = (
     _device("blade_encoder_slip", FaultTarget.BLADE, FaultParameter("slip_deg", "deg", -45.0, 45.0, 5.0)),
     _device("blade_encoder_failed", FaultTarget.BLADE),
     _device("brake_stuck", FaultTarget.BLADE, _whole("lifted", 0, 1, 0)),
+    _device("touch_probe", FaultTarget.BLADE),
     _device("overload", FaultTarget.BLADE, FaultParameter("moment_nm", "Nm", -200_000.0, 200_000.0, 30_000.0)),
     _device(
         "over_temperature",

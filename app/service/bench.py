@@ -22,6 +22,7 @@ from app.service.journal import Journal, Kind
 from app.service.link import TwinWatch
 from app.service.motion.desk import MotionDesk
 from app.service.motion.left import Left
+from app.service.motion.probe import Probes
 from app.service.office.office import Office
 from app.service.options import Options
 from app.service.pdo.desk import PdoDesk
@@ -80,6 +81,7 @@ class Bench:
         self.motion: MotionDesk | None = None
         self.battery_archive = BatteryArchive(self.office.store, self.stamper)
         self.batteries: BatteryDesk | None = None
+        self.probes: Probes | None = None
         self._left = Left(self.office.store)
         self.pdos = PdoDesk(self.office.store, self.stamper)
         self.twins: TwinWatch | None = None
@@ -139,6 +141,7 @@ class Bench:
         self.connection = connection
         self.motion = MotionDesk(connection, self.journal, self._left)
         self.batteries = BatteryDesk(connection, self.motion, self.battery_archive)
+        self.probes = Probes(connection)
         self.twins = TwinWatch(connection.targets, connection.buses, self.instructor is not None)
         self.epoch += 1
 
@@ -198,7 +201,10 @@ class Bench:
             await self.batteries.close()
         if self.motion is not None:
             await self.motion.close()
-        self.connection, self.twins, self.motion, self.batteries = None, None, None, None
+        if self.probes is not None:
+            await self.probes.close()
+        self.connection, self.twins, self.motion = None, None, None
+        self.batteries, self.probes = None, None
         self.epoch += 1
         self.journal.by(person).note(Kind.DISCONNECTED, None, turbine=connection.turbine.name)
         await connection.close()

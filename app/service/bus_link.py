@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from threading import Lock
 from typing import Any, Protocol
 
@@ -50,6 +50,8 @@ class BusLink(BusFeed):
         self.adapter = config.connection
         self.sink: FrameSink | None = None
         self.foreign: ForeignWrites | None = None
+        self.listeners: tuple[Callable[[Sequence[Record]], None], ...] = ()
+        """Told what the frames say, on the driver's receive thread; must not block."""
         self.driver: Any = driver_class(Bus.CANOPEN)(
             can,
             stamper,
@@ -76,6 +78,8 @@ class BusLink(BusFeed):
     def _heard(self, records: Sequence[Record]) -> None:
         if self.foreign is not None:
             self.foreign.heard(records)  # before the live state: it still knows what was there
+        for listener in self.listeners:
+            listener(records)
 
     @property
     def status(self) -> DriverStatus:

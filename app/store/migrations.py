@@ -184,6 +184,18 @@ STEPS: Final[tuple[tuple[str, ...], ...]] = (
             for doing in ("UPDATE", "DELETE")
         ),
     ),
+    (
+        """CREATE TABLE signal_runs (
+            id TEXT PRIMARY KEY NOT NULL, device TEXT NOT NULL, t_ns INTEGER NOT NULL, person TEXT NOT NULL,
+            shape TEXT NOT NULL, why TEXT NOT NULL, content TEXT NOT NULL
+        ) STRICT""",
+        "CREATE INDEX signal_runs_device ON signal_runs (device, t_ns)",
+        *(
+            f"""CREATE TRIGGER signal_runs_never_{doing.lower()} BEFORE {doing} ON signal_runs
+            BEGIN SELECT RAISE(ABORT, 'rows of signal_runs are kept as they are'); END"""
+            for doing in ("UPDATE", "DELETE")
+        ),
+    ),
 )
 SCHEMA: Final = len(STEPS)
 """The version that this program writes."""

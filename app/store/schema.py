@@ -358,3 +358,15 @@ battery_records = Table(
     Column("content", Text, nullable=False),
 )
 """Tests and changes of batteries; ``content`` is JSON of ``service.battery.records``. Rows are kept as they are."""
+signal_runs = Table(
+    "signal_runs",
+    metadata,
+    Column("id", Text, primary_key=True),
+    Column("device", Text, nullable=False),
+    Column("t_ns", Integer, nullable=False),
+    Column("person", Text, nullable=False),
+    Column("shape", Text, nullable=False),
+    Column("why", Text, nullable=False),
+    Column("content", Text, nullable=False),
+)
+"""Test signals that were run. ``content`` is JSON. Rows never change."""

@@ -120,6 +120,11 @@ def _brake(order: FaultOrder, blade: Blade) -> Iterator[Hold]:
     yield blade.axis, "brake_stuck", BrakeFault.LIFTED if order.values["lifted"] else BrakeFault.ENGAGED
 
 
+def _probe(_order: FaultOrder, blade: Blade) -> Iterator[Hold]:
+    """No fault of the drive: the mark is under the sensor as long as this lasts."""
+    yield blade.pmc.inputs, "probe", True
+
+
 def _overload(order: FaultOrder, blade: Blade) -> Iterator[Hold]:
     yield blade.axis, "extra_load_nm", order.values["moment_nm"]
 
@@ -153,6 +158,7 @@ _OF_BLADE: Final = {
     "blade_encoder_slip": _slip,
     "blade_encoder_failed": _blade_encoder,
     "brake_stuck": _brake,
+    "touch_probe": _probe,
     "overload": _overload,
     "over_temperature": _heat,
 }

@@ -52,6 +52,7 @@ _STATUS: Final[tuple[tuple[type[HubsideError], HTTPStatus], ...]] = (
     (errors.ReplayEndedError, HTTPStatus.NOT_FOUND),
     (errors.RestoreUnknownError, HTTPStatus.NOT_FOUND),
     (errors.SetUnknownError, HTTPStatus.NOT_FOUND),
+    (errors.SignalUnknownError, HTTPStatus.NOT_FOUND),
     (errors.RestoreOpenError, HTTPStatus.CONFLICT),
     (errors.RestoreRefusedError, HTTPStatus.CONFLICT),
     (errors.RestoreChangedError, HTTPStatus.CONFLICT),

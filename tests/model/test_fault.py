@@ -134,5 +134,5 @@ def test_an_order_with_its_time() -> None:
 
 def test_both_levels_are_there() -> None:
     levels = [kind.level for kind in CATALOGUE.values()]
-    assert levels.count(FaultLevel.DEVICE) == 16
+    assert levels.count(FaultLevel.DEVICE) == 17
     assert levels.count(FaultLevel.WIRE) == 9

@@ -150,6 +150,17 @@ def test_the_brake_is_stuck(rig: TurbineRig, lifted: int, state: BrakeFault) -> 
     assert rig.turbine.blades[1].axis.brake_stuck is BrakeFault.NONE
 
 
+def test_the_touch_probe_captures_where_the_mark_begins_and_ends(rig: TurbineRig) -> None:
+    position = rig.number(PMC, "6064", signed=True)
+    fault = put(rig, "touch_probe")
+    assert rig.number(PMC, "60FD") & 1 << 17
+    assert rig.number(PMC, "60BA", signed=True) == position
+    assert rig.number(PMC, "60BB", signed=True) == 0
+    rig.instructor.clear(fault)
+    assert not rig.number(PMC, "60FD") & 1 << 17
+    assert rig.number(PMC, "60BB", signed=True) == position
+
+
 def test_a_lifted_brake_lets_the_blade_turn_under_load(rig: TurbineRig) -> None:
     """Nothing holds an axis whose output stage is off."""
     before = rig.number(PMC, "6064", signed=True)

@@ -54,6 +54,8 @@ REFUSED_IN_REPLAY = {
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/battery/change"),
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/battery/change/give-up"),
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/battery/change/done"),
+    ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/signal"),
+    ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/probe/arm"),
     ("POST", "/api/live/motion/lease"),
     ("POST", "/api/live/motion/lease/ask"),
     ("POST", "/api/live/motion/confirm"),

@@ -86,6 +86,11 @@ ROUTES: Final[dict[tuple[str, str], Role]] = {
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/battery/change"): TECHNICIAN,
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/battery/change/give-up"): TECHNICIAN,
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/battery/change/done"): TECHNICIAN,
+    ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/signal"): TECHNICIAN,
+    ("GET", "/api/live/devices/{turbine}/{station}/{device}/motion/probe"): VIEWER,
+    ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/probe/arm"): TECHNICIAN,
+    ("GET", "/api/live/devices/{turbine}/{station}/{device}/motion/signals"): VIEWER,
+    ("GET", "/api/signals/{run_id}"): VIEWER,
     ("GET", "/api/live/descriptions/{description_id}"): VIEWER,
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/read"): TECHNICIAN,
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/write"): TECHNICIAN,
@@ -260,6 +265,7 @@ BRINGS_BYTES: Final = {("POST", "/api/recordings/import"), ("POST", "/api/incide
 """To these a file is sent as it is."""
 
 PLACES: Final = {
+    "{run_id}": "0197a000-0000-7000-8000-000000000001",
     "{turbine}": "wtg-07",
     "{station}": "blade-1",
     "{device}": "pmc",

@@ -58,6 +58,7 @@ class AxisMode(IntEnum):
     PROFILE_POSITION = 1
     PROFILE_VELOCITY = 3
     HOMING = 6
+    CYCLIC_POSITION = 8
 
 
 class Control:

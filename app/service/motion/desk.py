@@ -63,6 +63,7 @@ class Doing(Enum):
     HOLD = "hold"
     FEATHER = "feather"
     BRAKE_TEST = "brake_test"
+    SIGNAL = "signal"
 
 
 class Ended(Enum):

@@ -8,6 +8,7 @@ from app.service.incidents.annotations import Annotations
 from app.service.incidents.incidents import Incidents
 from app.service.journal import Journal
 from app.service.library.library import Library
+from app.service.motion.runs import SignalRuns
 from app.service.motors import Motors
 from app.service.office.audit import AuditLog
 from app.service.office.sessions import Sessions
@@ -17,7 +18,7 @@ from app.store.store import Store
 
 
 class Office:
-    """Audit log, users, sessions, visits, motors and incidents of ``store``. ``stamp`` gives t_ns.
+    """Audit log, users, sessions, visits, motors, incidents and test signals of ``store``. ``stamp`` gives t_ns.
 
     Every event of ``journal`` is audited. ``person`` is who a launch token lets in. Raises StoreError. Belongs to the
     event loop, and owns the store.
@@ -33,6 +34,7 @@ class Office:
         self.motors = Motors(store, self.audit, stamp)
         self.incidents = Incidents(store, self.audit, stamp, journal)
         self.annotations = Annotations(store, self.audit, stamp)
+        self.signal_runs = SignalRuns(store, stamp)
         self._stop_listening = journal.listen(self.audit.take)
 
     async def close(self) -> None:

@@ -1094,6 +1094,46 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/live/devices/{turbine}/{station}/{device}/motion/probe": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Probe
+         * @description How the touch probe stands. It is read twenty times a second for 2 s from each such request on.
+         */
+        get: operations["probe"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/live/devices/{turbine}/{station}/{device}/motion/probe/arm": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Arm Probe
+         * @description Take captures from now on for new; nothing is written to the drive.
+         */
+        post: operations["arm_probe"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/live/devices/{turbine}/{station}/{device}/motion/put-back": {
         parameters: {
             query?: never;
@@ -1128,6 +1168,46 @@ export interface paths {
          * @description Reset the fault of the axis; nothing moves by it.
          */
         post: operations["reset"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/live/devices/{turbine}/{station}/{device}/motion/signal": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Signal
+         * @description Run a test signal (mode 8) as long as it is held, and keep what came of it, whatever ended it.
+         */
+        post: operations["signal"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/live/devices/{turbine}/{station}/{device}/motion/signals": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Signals
+         * @description The latest runs of a device, newest first.
+         */
+        get: operations["signals"];
+        put?: never;
+        post?: never;
         delete?: never;
         options?: never;
         head?: never;
@@ -3304,6 +3384,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/signals/{run_id}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Signal Run
+         * @description One run with its courses; 404 ``signal_unknown``.
+         */
+        get: operations["signal_run"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/texts/{locale}": {
         parameters: {
             query?: never;
@@ -4442,6 +4542,16 @@ export interface components {
             turbine: string;
         };
         /**
+         * CourseDoc
+         * @description Times in ms from the first target on, and values.
+         */
+        CourseDoc: {
+            /** T Ms */
+            t_ms: number[];
+            /** Y */
+            y: number[];
+        };
+        /**
          * CursorLine
          * @description The cursor of a replay. Times in t_ns.
          *
@@ -5315,6 +5425,22 @@ export interface components {
             fence: number;
             /** Order */
             order: number;
+        };
+        /**
+         * InForceDoc
+         * @description A parameter as it stood before the run.
+         */
+        InForceDoc: {
+            /** Address */
+            address: string;
+            /** Name */
+            name: string;
+            /** Raw */
+            raw: number;
+            /** Shown */
+            shown: string;
+            /** Unit */
+            unit: string;
         };
         /**
          * IncidentChange
@@ -7357,6 +7483,36 @@ export interface components {
             visit: components["schemas"]["VisitDoc"] | null;
         };
         /**
+         * ProbeLine
+         * @description A probe as a page sees it. Degrees; times in t_ns; None: not known, or not yet.
+         *
+         *     ``first``: the edge of the first capture since it was armed.
+         */
+        ProbeLine: {
+            /** Armed Ns */
+            armed_ns: number | null;
+            /** Falling Deg */
+            falling_deg: number | null;
+            /** Falling New */
+            falling_new: boolean;
+            /** Falling Ns */
+            falling_ns: number | null;
+            /** First */
+            first: string | null;
+            /** First Deg */
+            first_deg: number | null;
+            /** First Ns */
+            first_ns: number | null;
+            /** Level */
+            level: boolean | null;
+            /** Rising Deg */
+            rising_deg: number | null;
+            /** Rising New */
+            rising_new: boolean;
+            /** Rising Ns */
+            rising_ns: number | null;
+        };
+        /**
          * Problem
          * @description What went wrong (RFC 9457). ``text`` is the operator's text in the language that was asked for (Accept-Language).
          *
@@ -7381,6 +7537,40 @@ export interface components {
             title: string;
             /** Type */
             type: string;
+        };
+        /**
+         * ProposalDoc
+         * @description No values: it is well as it is.
+         */
+        ProposalDoc: {
+            /** Reasons */
+            reasons: components["schemas"]["ReasonDoc"][];
+            /** Values */
+            values: components["schemas"]["ProposedDoc"][];
+        };
+        /**
+         * ProposedDoc
+         * @description A raw value that should become another one.
+         */
+        ProposedDoc: {
+            /** Address */
+            address: string;
+            /** New */
+            new: number;
+            /** Old */
+            old: number;
+        };
+        /**
+         * RampDoc
+         * @description Lag at constant speed; ``gain_per_s`` is speed / lag.
+         */
+        RampDoc: {
+            /** Gain Per S */
+            gain_per_s: number | null;
+            /** Lag Deg */
+            lag_deg: number;
+            /** Speed Dps */
+            speed_dps: number;
         };
         /**
          * RateTriedDoc
@@ -7408,6 +7598,18 @@ export interface components {
          * @enum {string}
          */
         Reason: "same_event" | "mains" | "hold_up" | "battery_load" | "no_voltage" | "window_time" | "fault_opens" | "chain" | "restart_opens" | "unit_missed" | "partner_silent" | "command" | "efc_rules" | "drives_to_feather" | "fault_pending" | "power_down" | "off_the_bus";
+        /**
+         * ReasonDoc
+         * @description Text key ``page.setup.controller.reason.<key>``, filled with ``details``.
+         */
+        ReasonDoc: {
+            /** Details */
+            details: {
+                [key: string]: unknown;
+            };
+            /** Key */
+            key: string;
+        };
         /**
          * RecordingDoc
          * @description What one file holds beside its frames.
@@ -8728,6 +8930,125 @@ export interface components {
             unit: string;
         };
         /**
+         * SignalRequest
+         * @description Run a test signal while it is held.
+         * @example {
+         *       "fence": 1764029382123456,
+         *       "order": 5,
+         *       "signal": {
+         *         "amplitude_deg": 1,
+         *         "cycles": 3,
+         *         "frequency_hz": 0.5,
+         *         "hold_s": 1,
+         *         "shape": "sine",
+         *         "speed_dps": 2
+         *       }
+         *     }
+         */
+        SignalRequest: {
+            /** Fence */
+            fence: number;
+            /** Order */
+            order: number;
+            signal: components["schemas"]["SignalSettings"];
+        };
+        /**
+         * SignalResults
+         * @description What the response says; None where it does not show it.
+         */
+        SignalResults: {
+            /** Lag Ms */
+            lag_ms: number | null;
+            /** Most Following Deg */
+            most_following_deg: number | null;
+            ramp: components["schemas"]["RampDoc"] | null;
+            sine: components["schemas"]["SineDoc"] | null;
+            step: components["schemas"]["StepDoc"] | null;
+        };
+        /**
+         * SignalRunDoc
+         * @description A run with its courses: demand, set_point, position, expected, following (degrees), velocity, current (%).
+         */
+        SignalRunDoc: {
+            /** Courses */
+            courses: {
+                [key: string]: components["schemas"]["CourseDoc"];
+            };
+            /** Device */
+            device: string;
+            /** Error */
+            error: string | null;
+            /** Id */
+            id: string;
+            /** In Force */
+            in_force: components["schemas"]["InForceDoc"][];
+            /** Interpolation Ms */
+            interpolation_ms: number;
+            /** Late */
+            late: number;
+            /** Period Ms */
+            period_ms: number;
+            /** Person */
+            person: string;
+            proposal: components["schemas"]["ProposalDoc"] | null;
+            results: components["schemas"]["SignalResults"];
+            /** Sent */
+            sent: number;
+            signal: components["schemas"]["SignalSettings"];
+            /** Start Deg */
+            start_deg: number;
+            /** T Ns */
+            t_ns: number;
+            /**
+             * Transport
+             * @enum {string}
+             */
+            transport: "pdo" | "sdo";
+            /** Why */
+            why: string;
+        };
+        /**
+         * SignalRunLine
+         * @description A run in the list. ``why`` is the end of a text key ``motion.ended``.
+         */
+        SignalRunLine: {
+            /** Device */
+            device: string;
+            /** Error */
+            error: string | null;
+            /** Id */
+            id: string;
+            /** Person */
+            person: string;
+            results: components["schemas"]["SignalResults"];
+            signal: components["schemas"]["SignalSettings"];
+            /** T Ns */
+            t_ns: number;
+            /** Why */
+            why: string;
+        };
+        /**
+         * SignalSettings
+         * @description A signal: degrees, negative towards 0; Hz for a sine; degrees per second and s of standing for step and ramp.
+         */
+        SignalSettings: {
+            /** Amplitude Deg */
+            amplitude_deg: number;
+            /** Cycles */
+            cycles: number;
+            /** Frequency Hz */
+            frequency_hz: number;
+            /** Hold S */
+            hold_s: number;
+            /**
+             * Shape
+             * @enum {string}
+             */
+            shape: "sine" | "step" | "ramp";
+            /** Speed Dps */
+            speed_dps: number;
+        };
+        /**
          * SignalWanted
          * @description An object such as ``6064``, on one blade or all, of ``pmm``, ``pmc`` or both; or of exactly one node of a bus.
          */
@@ -8795,6 +9116,22 @@ export interface components {
             text_key: string | null;
             /** Total */
             total: number;
+        };
+        /**
+         * SineDoc
+         * @description Actual position over set-point; ``delay_ms`` positive: it is behind.
+         */
+        SineDoc: {
+            /** Delay Ms */
+            delay_ms: number;
+            /** Frequency Hz */
+            frequency_hz: number;
+            /** Phase Deg */
+            phase_deg: number;
+            /** Ratio */
+            ratio: number;
+            /** Rest Deg */
+            rest_deg: number;
         };
         /**
          * SiteDeviceDoc
@@ -8945,6 +9282,24 @@ export interface components {
             name: string;
             /** Slug */
             slug: string;
+        };
+        /**
+         * StepDoc
+         * @description Times from the target on; ``band_deg``: in which it counts as settled.
+         */
+        StepDoc: {
+            /** Band Deg */
+            band_deg: number;
+            /** Dead Ms */
+            dead_ms: number | null;
+            /** Error Deg */
+            error_deg: number;
+            /** Overshoot Percent */
+            overshoot_percent: number;
+            /** Rise Ms */
+            rise_ms: number | null;
+            /** Settling Ms */
+            settling_ms: number | null;
         };
         /**
          * StopDone
@@ -14479,6 +14834,198 @@ export interface operations {
             };
         };
     };
+    probe: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                turbine: string;
+                station: string;
+                device: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ProbeLine"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Conflict */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Bad Gateway */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Service Unavailable */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Gateway Timeout */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    arm_probe: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                turbine: string;
+                station: string;
+                device: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ProbeLine"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Conflict */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Bad Gateway */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Service Unavailable */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Gateway Timeout */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
     put_back: {
         parameters: {
             query?: never;
@@ -14664,6 +15211,225 @@ export interface operations {
             };
             /** @description Unprocessable Entity */
             422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Bad Gateway */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Service Unavailable */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Gateway Timeout */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    signal: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                turbine: string;
+                station: string;
+                device: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "fence": 1764029382123456,
+                 *       "order": 5,
+                 *       "signal": {
+                 *         "amplitude_deg": 1,
+                 *         "cycles": 3,
+                 *         "frequency_hz": 0.5,
+                 *         "hold_s": 1,
+                 *         "shape": "sine",
+                 *         "speed_dps": 2
+                 *       }
+                 *     }
+                 */
+                "application/json": components["schemas"]["SignalRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SignalRunDoc"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Conflict */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Bad Gateway */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Service Unavailable */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Gateway Timeout */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    signals: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                turbine: string;
+                station: string;
+                device: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SignalRunLine"][];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Conflict */
+            409: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -22859,6 +23625,64 @@ export interface operations {
             };
             /** @description Unprocessable Entity */
             422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    signal_run: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                run_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SignalRunDoc"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
                 headers: {
                     [name: string]: unknown;
                 };

@@ -47,6 +47,9 @@ export interface PageSearch {
   /** The gear trains that are typed there, of the motor and of the blade encoder ("1024/1~1/183x12/111~36000/1"). */
   gear?: string;
   ae?: string;
+  /** The run of a test signal that is shown, and the one that is laid over it. */
+  run?: string;
+  over?: string;
   /** Name of the recording or set that is open. */
   file?: string;
   /** Filter, order (column, minus sign where descending) and hidden columns of the tables of files, sets and the bus. */
@@ -128,6 +131,8 @@ const TEXTS = [
   "pdo",
   "gear",
   "ae",
+  "run",
+  "over",
   "file",
   "find",
   "order",

@@ -11,6 +11,8 @@ import { Interlocks } from "./Interlocks";
 import { MoveSection } from "./MoveSection";
 import { PrepareSection } from "./PrepareSection";
 import { TrySection } from "./TrySection";
+import { ProbeSection } from "./ProbeSection";
+import { SignalSection } from "./SignalSection";
 
 /** Moving the blade from here: control, what holds it back, the proof that it stops, then hold to run. */
 export function MotionPanel({ device, context }: { device: DeviceRef; context: DeviceContext | null }) {
@@ -32,6 +34,8 @@ export function MotionPanel({ device, context }: { device: DeviceRef; context: D
         <TrySection device={device.slug} context={context} />
         <HomeSection device={device.slug} />
         <EndSection device={device.slug} />
+        <SignalSection device={device.slug} />
+        <ProbeSection device={device.slug} />
       </div>
       <p className={motion.plain}>{t("page.motion.no_safety")}</p>
     </section>

@@ -26,6 +26,7 @@ const PICTURES: Readonly<Record<string, ComponentType<PictureProps>>> = {
   ladder: lazy(async () => ({ default: (await import("./ladder/Ladder")).Ladder })),
   battery: lazy(async () => ({ default: (await import("./battery/BatteryPicture")).BatteryPicture })),
   gear: lazy(async () => ({ default: (await import("./gear/GearPicture")).GearPicture })),
+  controller: lazy(async () => ({ default: (await import("./ControllerPicture")).ControllerPicture })),
 };
 
 /** The pictures that set up an axis; what is changed in one is staged, and written from the review of all changes. */
