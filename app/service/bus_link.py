@@ -28,6 +28,13 @@ class FrameSink(Protocol):
         """Take a batch."""
 
 
+class Listener(Protocol):
+    """Hears every decoded record; never raises and never waits: the scope."""
+
+    def hear(self, records: Sequence[Record]) -> None:
+        """Take a batch."""
+
+
 class BusLink(BusFeed):
     """A CANopen bus: what its driver hears goes to the recorder first.
 
@@ -50,6 +57,7 @@ class BusLink(BusFeed):
         self.adapter = config.connection
         self.sink: FrameSink | None = None
         self.foreign: ForeignWrites | None = None
+        self.listener: Listener | None = None
         self.driver: Any = driver_class(Bus.CANOPEN)(
             can,
             stamper,
@@ -76,6 +84,14 @@ class BusLink(BusFeed):
     def _heard(self, records: Sequence[Record]) -> None:
         if self.foreign is not None:
             self.foreign.heard(records)  # before the live state: it still knows what was there
+        listener = self.listener
+        if listener is not None:
+            listener.hear(records)
+
+    def _missed(self, records: Sequence[Record]) -> None:
+        listener = self.listener
+        if listener is not None:
+            listener.hear(records)
 
     @property
     def status(self) -> DriverStatus:

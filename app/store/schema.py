@@ -346,3 +346,14 @@ recording_hashes = Table(
     Column("t_ns", Integer, nullable=False),
 )
 """The hash of a whole file by that of its ends and its size: a large file is read once."""
+
+scope_captures = Table(
+    "scope_captures",
+    metadata,
+    Column("id", Text, primary_key=True),
+    Column("trigger_ns", Integer, nullable=False),
+    Column("head", Text, nullable=False),
+    Column("samples", LargeBinary, nullable=False),
+    Column("in_force", Text, nullable=False),
+)
+"""``head`` and ``in_force`` are JSON, ``samples`` packed arrays (``service.scope.capture``)."""

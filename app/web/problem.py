@@ -64,6 +64,8 @@ _STATUS: Final[tuple[tuple[type[HubsideError], HTTPStatus], ...]] = (
     (errors.AxisStateError, HTTPStatus.CONFLICT),
     (errors.NotPreparedError, HTTPStatus.CONFLICT),
     (errors.OvertakenError, HTTPStatus.CONFLICT),
+    (errors.ScopeStateError, HTTPStatus.CONFLICT),
+    (errors.ScopeUnknownError, HTTPStatus.NOT_FOUND),
     (errors.RefusedError, HTTPStatus.UNPROCESSABLE_ENTITY),
     (errors.ColumnError, HTTPStatus.NOT_FOUND),
     (errors.StoreError, HTTPStatus.SERVICE_UNAVAILABLE),

@@ -23,6 +23,7 @@ TEXT_KEYS: Final = frozenset(
     scenario_stopped scenario_ended incident_made restore_begun restore_confirmed restore_turned_back restore_resumed
     restore_done restore_rolled_back restore_incomplete restore_given_up nmt_sent lease_taken lease_ended
     motion_prepared motion_put_back motion_begun motion_ended motion_stopped fault_reset homed
+    scope_armed scope_captured
     """.split()
 )
 """The texts of events that recordings of this bench bear."""

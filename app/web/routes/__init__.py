@@ -23,6 +23,7 @@ from app.web.routes import (
     replay_views,
     restore,
     rules,
+    scope,
     session,
     sets,
     settings,
@@ -60,6 +61,7 @@ FEATURES = (
     desk,
     analysis,
     incidents,
+    scope,
 )
 
 
