@@ -267,6 +267,7 @@ PLACES: Final = {
     "{job_id}": "none",
     "{fault}": "1",
     "{record_file}": "none.json",
+    "{capture_id}": "0197a000-0000-7000-8000-00000000ca97",
     "{restore_id}": "0197a000-0000-7000-8000-000000000000",
     "{name}": "none.mcap",
     "{replay_id}": "none",

@@ -1,7 +1,7 @@
 """Where the scope listens: picks what it wants out of the decoded records of a bus, and hands it to the event loop.
 
-It runs on the receive thread. While nothing is armed no tap stands at a bus. What it costs is one look-up for each value
-that crosses the wire.
+It runs on the receive thread. While nothing is armed no tap stands at a bus. What it costs is one look-up for each
+value that crosses the wire.
 """
 
 from __future__ import annotations
