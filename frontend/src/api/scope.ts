@@ -93,6 +93,7 @@ export const spectrumQuery = (id: string, signalName: string, span: Span) =>
       const search = new URLSearchParams([["signal", signalName], ...spanOf(span)]);
       return get<Spectrum>(`${of(id)}/spectrum?${search}`, signal);
     },
+    enabled: signalName !== "",
     retry: false,
     gcTime: 60_000,
   });
@@ -104,6 +105,7 @@ export const xyQuery = (id: string, x: string, y: string, span: Span) =>
       const search = new URLSearchParams([["x", x], ["y", y], ...spanOf(span)]);
       return get<XyPoints>(`${of(id)}/xy?${search}`, signal);
     },
+    enabled: x !== "" && y !== "",
     placeholderData: keepPreviousData,
     retry: false,
     gcTime: 60_000,

@@ -10,6 +10,9 @@ import { useWidth } from "./ScopePlots";
 
 const LEFT_PX = 64;
 const MARGIN = 0.06;
+/** So many points at most are dots as well. */
+const DOTS = 3000;
+const DOT_PX = 2;
 
 interface Props {
   /** Points that are joined in their order; null breaks the line. */
@@ -36,14 +39,14 @@ export function Chart({ x, y, colour, label, xUnit, yUnit, fromZero, drawn, name
     if (!element || width === 0) return;
     const show = (text: string) => localise(text, t.language);
     const axis = axisOf(element);
-    const paint = (made: UPlot) => paintCurve(made, x, y, coloursOf(element)[colour] ?? "");
+    const paint = (made: UPlot) => paintCurve(made, x, y, coloursOf(element)[colour] ?? "", !fromZero);
     const made = new UPlot(
       {
         width,
         height: element.clientHeight,
         legend: { show: false },
         cursor: { show: false },
-        padding: [8, 14, 0, 0],
+        padding: [18, 14, 0, 0],
         scales: {
           x: { time: false, range: rangeOf(x, fromZero) },
           y: { range: rangeOf(y, fromZero) },
@@ -94,7 +97,7 @@ function rangeOf(values: readonly (number | null)[], fromZero: boolean): [number
     if (one > high) high = one;
   }
   if (low > high) return [0, 1];
-  const apart = Math.max(high - low, Math.abs(high) * 1e-3, 1e-6);
+  const apart = Math.max(high - low, Math.abs(high) * 1e-3, 0.01);
   return [fromZero ? 0 : low - apart * MARGIN, high + apart * MARGIN];
 }
 
@@ -103,6 +106,7 @@ function paintCurve(
   x: readonly (number | null)[],
   y: readonly (number | null)[],
   colour: string,
+  dots: boolean,
 ): void {
   const { ctx: brush, bbox } = made;
   brush.save();
@@ -126,5 +130,21 @@ function paintCurve(
   brush.lineWidth = 1.6 * devicePixelRatio;
   brush.lineJoin = "round";
   brush.stroke();
+  if (dots && x.length <= DOTS) {
+    brush.fillStyle = colour;
+    x.forEach((at, n) => {
+      const value = y[n] ?? null;
+      if (at === null || value === null) return;
+      brush.beginPath();
+      brush.arc(
+        made.valToPos(at, "x", true),
+        made.valToPos(value, "y", true),
+        DOT_PX * devicePixelRatio,
+        0,
+        2 * Math.PI,
+      );
+      brush.fill();
+    });
+  }
   brush.restore();
 }

@@ -14,7 +14,9 @@ import type { Pair } from "./view";
 export const LEFT_PX = 64;
 export const RIGHT_PX = 12;
 const BOTTOM_PX = 24;
-const TOP_PX = 6;
+/** Below a plot that is not the last: its axis of time is the last one's. */
+const NARROW_PX = 8;
+const TOP_PX = 18;
 const LINE_PX = 1.6;
 const REFERENCE_PX = 1.2;
 /** Single values are dots where they lie at least so far apart. */
@@ -28,11 +30,13 @@ interface Props {
   width: number;
   marks: readonly { atS: number; what: KeptMark["what"] }[];
   label: string;
+  /** Has the axis of time. */
+  last: boolean;
   onMade: (key: string, made: UPlot | null) => void;
 }
 
 /** The signals of one unit, or bits in lanes. Between two values the last one holds: nothing is drawn that was not seen. */
-export function ScopePlot({ group, view, endS, width, marks, label, onMade }: Props) {
+export function ScopePlot({ group, view, endS, width, marks, label, last, onMade }: Props) {
   const t = useTexts();
   const scheme = useComputedColorScheme();
   const holder = useRef<HTMLDivElement>(null);
@@ -40,7 +44,7 @@ export function ScopePlot({ group, view, endS, width, marks, label, onMade }: Pr
   const scene = useRef<Props | null>(null);
   const { key } = group;
   useEffect(() => {
-    scene.current = { group, view, endS, width, marks, label, onMade };
+    scene.current = { group, view, endS, width, marks, label, last, onMade };
     if (drawn.current) rescale(drawn.current, scene.current);
   });
   useEffect(() => {
@@ -51,7 +55,7 @@ export function ScopePlot({ group, view, endS, width, marks, label, onMade }: Pr
     };
     const show = (text: string) => localise(text, t.language);
     const made = new UPlot(
-      optionsOf(element, width, key === BITS, show, paint),
+      optionsOf(element, width, { lanes: key === BITS, last }, show, paint),
       [
         [0, 1],
         [null, null],
@@ -69,7 +73,7 @@ export function ScopePlot({ group, view, endS, width, marks, label, onMade }: Pr
       made.destroy();
       drawn.current = null;
     };
-  }, [key, width, scheme, t, onMade]);
+  }, [key, width, scheme, t, last, onMade]);
   return (
     <div
       ref={holder}
@@ -77,9 +81,14 @@ export function ScopePlot({ group, view, endS, width, marks, label, onMade }: Pr
       role="img"
       aria-label={label}
       data-plot
+      data-last={last}
       data-testid={`scope-plot-${key}`}
     >
-      <span className={classes.unit}>{group.unit}</span>
+      <span className={classes.unit}>
+        {group.unit === ""
+          ? t(key === BITS ? "page.scope.plot_bits" : "page.scope.plot_numbers")
+          : group.unit}
+      </span>
     </div>
   );
 }
@@ -166,6 +175,7 @@ function paintNames(
   const names = namesIn(group);
   brush.font = `${11 * devicePixelRatio}px ${style.fontFamily}`;
   brush.textBaseline = "middle";
+  brush.textAlign = "left";
   names.forEach((name, lane) => {
     const trace = group.traces.find((one) => one.name === name);
     if (!trace) return;
@@ -201,7 +211,7 @@ function vertical(
 function optionsOf(
   element: HTMLElement,
   width: number,
-  lanes: boolean,
+  { lanes, last }: { lanes: boolean; last: boolean },
   show: (text: string) => string,
   paint: (made: UPlot) => void,
 ): UPlot.Options {
@@ -214,7 +224,13 @@ function optionsOf(
     padding: [TOP_PX, RIGHT_PX, 0, 0],
     scales: { x: { time: false, auto: false }, y: { auto: false } },
     axes: [
-      { ...axis, size: BOTTOM_PX, gap: 3, space: 70, values: (_made, splits) => labels(splits).map(show) },
+      {
+        ...axis,
+        size: last ? BOTTOM_PX : NARROW_PX,
+        gap: 3,
+        space: 70,
+        values: (_made, splits) => (last ? labels(splits).map(show) : splits.map(() => "")),
+      },
       {
         ...axis,
         size: LEFT_PX,
@@ -243,7 +259,8 @@ export function axisOf(element: HTMLElement): UPlot.Axis {
 /** All with as many decimals as the distance between two asks for. */
 export function labels(splits: readonly number[]): string[] {
   const apart = Math.abs((splits[1] ?? 1) - (splits[0] ?? 0)) || 1;
-  const whole = (count: number) => Math.abs(apart * 10 ** count - Math.round(apart * 10 ** count)) < 1e-6;
-  const decimals = [0, 1, 2, 3, 4, 5].find(whole) ?? 6;
+  const whole = (count: number) =>
+    Math.abs(apart * 10 ** count - Math.round(apart * 10 ** count)) < 1e-6 && apart * 10 ** count > 0.5;
+  const decimals = [0, 1, 2, 3, 4, 5, 6, 7, 8].find(whole) ?? 9;
   return splits.map((at) => at.toFixed(decimals).replace("-", "−"));
 }

@@ -117,7 +117,7 @@ export function ScopePlots(props: Props) {
       onKeyDown={onKeyDown}
       data-testid="scope-plots"
     >
-      {groups.map((group) => (
+      {groups.map((group, at) => (
         <ScopePlot
           key={group.key}
           group={group}
@@ -126,6 +126,7 @@ export function ScopePlots(props: Props) {
           width={width}
           marks={marks}
           onMade={onMade}
+          last={at === groups.length - 1}
           label={t("page.scope.plot", {
             signals:
               group.key === BITS

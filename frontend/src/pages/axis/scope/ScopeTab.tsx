@@ -71,7 +71,7 @@ export function ScopeTab() {
           <Tabs value={side} onChange={(next) => next !== null && setSide(next as Side)}>
             <Tabs.List grow>
               {(["signals", "trigger", "captures"] as const).map((one) => (
-                <Tabs.Tab key={one} value={one} h={40} data-testid={`scope-side-${one}`}>
+                <Tabs.Tab key={one} value={one} h={40} px={4} data-testid={`scope-side-${one}`}>
                   {t(`page.scope.tab_${one}`)}
                 </Tabs.Tab>
               ))}
