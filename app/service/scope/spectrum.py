@@ -8,6 +8,7 @@ the signal's unit: a sine of amplitude 1 gives 1.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Final
 
@@ -22,6 +23,7 @@ MAX_POINTS: Final = 4000
 PEAKS: Final = 10
 _SHARE: Final = 0.02
 """What is weaker than this part of the strongest is no peak."""
+_CENTRED: Final = 1e-6
 _FIRST_BIN: Final = 2
 """Hann's window spreads what is at zero over the bins below."""
 
@@ -102,7 +104,7 @@ def amplitudes(numbers: Floats) -> tuple[Floats, float]:
 
 
 def peaks_of(frequency: Floats, amplitude: Floats) -> list[Peak]:
-    """The strongest local maxima; between bins by a parabola through the logarithms, which fits Hann's window."""
+    """The strongest local maxima, each where it lies between the bins."""
     if len(amplitude) <= _FIRST_BIN + 2:
         return []
     inner = np.arange(_FIRST_BIN, len(amplitude) - 1)
@@ -114,11 +116,17 @@ def peaks_of(frequency: Floats, amplitude: Floats) -> list[Peak]:
 
 
 def _between(frequency: Floats, amplitude: Floats, at: int) -> Peak:
-    left, top, right = np.log(np.maximum(amplitude[at - 1 : at + 2], 1e-300))
-    bend = left - 2 * top + right
-    shift = 0.0 if bend >= 0 else float(np.clip(0.5 * (left - right) / bend, -0.5, 0.5))
-    height = float(np.exp(top - 0.25 * (left - right) * shift))
-    return Peak(float(frequency[at] + shift * frequency[1]), height)
+    """Where between the bins a sine lies that gives these three, and its amplitude, by the main lobe of the window.
+
+    Of Hann's window the lobe is sin(pi d) / (pi d (1 - d^2)) at a distance of d bins, so the ratio of two neighbours
+    tells d.
+    """
+    left, top, right = (float(one) for one in amplitude[at - 1 : at + 2])
+    ratio = max(left, right) / top
+    shift = min(0.5, max(0.0, (2 * ratio - 1) / (ratio + 1)))
+    lobe = 1.0 if shift < _CENTRED else math.sin(math.pi * shift) / (math.pi * shift * (1 - shift**2))
+    signed = shift if right > left else -shift
+    return Peak(float(frequency[at] + signed * frequency[1]), top / lobe)
 
 
 def _greatest(frequency: Floats, amplitude: Floats) -> tuple[Floats, Floats]:

@@ -43,7 +43,6 @@ export function CapturesPanel({ captures, open, references, onOpen, onReferences
               mih={44}
               py={4}
               fullWidth
-              aria-label={t("page.scope.open", { name: head.name })}
               aria-current={head.id === open}
               onClick={() => onOpen(head.id)}
               data-testid="open-capture"

@@ -101,13 +101,12 @@ function Search({ options, chosen, onChosen }: Pick<Props, "options" | "chosen" 
         data-testid="find-signal"
       />
       {full && <p className={classes.told}>{t("page.scope.full")}</p>}
-      <ul className={classes.hits} data-testid="signal-hits">
+      <ul className={classes.hits} aria-label={t("page.scope.hits")} data-testid="signal-hits">
         {shown.map((one) => (
           <li key={one.name}>
             <button
               type="button"
               disabled={full}
-              aria-label={t("page.scope.add", { signal: `${one.place} ${one.title}` })}
               onClick={() => onChosen([...chosen, one.name])}
               data-testid={`add-${one.name}`}
             >
