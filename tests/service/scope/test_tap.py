@@ -9,7 +9,7 @@ from threading import Thread
 from app.model.address import Address
 from app.service.scope.signals import Place
 from app.service.scope.tap import BEHIND, Heard, Tap
-from app.wire.records import EmcySeen, GapSeen, Source, SyncSeen, ValueSeen
+from app.wire.records import EmcySeen, GapSeen, Record, Source, SyncSeen, ValueSeen
 
 STATUSWORD = Address(0x6041)
 
@@ -18,7 +18,7 @@ def value(t_ns: int, address: Address = STATUSWORD, node: int = 11, source: Sour
     return ValueSeen(t_ns, "can0", node, address, b"\x21\x00", source)
 
 
-async def heard_of(batches: Sequence[Sequence[Heard]], most: int = 1000, between: bool = True) -> list[Heard]:
+async def heard_of(batches: Sequence[Sequence[Record]], most: int = 1000, between: bool = True) -> list[Heard]:
     """What comes out in the loop of what another thread hears."""
     heard: list[Heard] = []
     tap = Tap({Place("can0", 11, STATUSWORD): 0}, asyncio.get_running_loop(), heard.extend, most)
@@ -34,7 +34,14 @@ async def heard_of(batches: Sequence[Sequence[Heard]], most: int = 1000, between
 
 async def test_it_hands_over_what_is_wanted_in_order() -> None:
     emcy = EmcySeen(3, "can0", 12, 0x3120, 1, bytes(5))
-    batch = [value(1), value(2, Address(0x6064)), value(2, node=12), emcy, SyncSeen(4, "can0", 0, None), value(5)]
+    batch: list[Record] = [
+        value(1),
+        value(2, Address(0x6064)),
+        value(2, node=12),
+        emcy,
+        SyncSeen(4, "can0", 0, None),
+        value(5),
+    ]
     sent_by_emcy = value(6, source=Source.EMCY)
     assert await heard_of([[*batch, sent_by_emcy], [value(7)]]) == [value(1), emcy, value(5), value(7)]
 
