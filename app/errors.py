@@ -80,6 +80,11 @@
     │   ├── BatteryConditionError           a condition of the battery test does not hold; names it
     │   ├── BatteryNotNotedError            the old battery was not noted before its change
     │   ├── SignalUnknownError              no such run of a test signal
+    │   ├── ScopeSettingsError              a setting of the scope that does not fit; names the field
+    │   ├── ScopeStateError                 not in the state that the scope is in
+    │   ├── ScopeUnknownError               no such capture
+    │   ├── ScopeCaptureError               a capture that cannot be kept or read
+    │   ├── ScopeSpectrumError              values of which no spectrum can be made; says why
     │   ├── NoInstructorError               the connected turbine is none of the twins that we started
     │   └── FaultOrderError                 a fault that cannot be put into a twin so; names the field
     │       └── FaultValueError             one of its values is out of range; names the limits
@@ -594,6 +599,36 @@ class SignalUnknownError(RefusedError):
     """No such run of a test signal. Details: run."""
 
     code = "signal_unknown"
+
+
+class ScopeSettingsError(RefusedError):
+    """A setting of the scope does not fit. Details: field, reason_key (a text key with what it needs)."""
+
+    code = "scope_settings"
+
+
+class ScopeStateError(RefusedError):
+    """The scope is in another state. Details: state_key (a text key)."""
+
+    code = "scope_state"
+
+
+class ScopeUnknownError(RefusedError):
+    """There is no such capture. Details: capture."""
+
+    code = "scope_unknown"
+
+
+class ScopeCaptureError(RefusedError):
+    """A capture cannot be kept, or read. Details: capture, reason."""
+
+    code = "scope_capture"
+
+
+class ScopeSpectrumError(RefusedError):
+    """No spectrum can be made of these values. Details: reason_key (a text key), count, least."""
+
+    code = "scope_spectrum"
 
 
 class NoInstructorError(RefusedError):

@@ -31,6 +31,7 @@ from app.service.polling import Polling
 from app.service.recording_list import Recordings, samples_folder
 from app.service.replay.moments import Moments
 from app.service.restore.desk import Desk
+from app.service.scope.desk import ScopeDesk
 from app.service.site_edit import SiteEditor
 from app.service.sites import Sites
 from app.store.store import Store
@@ -77,6 +78,9 @@ class Bench:
         self.restores = Desk(self.office, self.journal, self.stamper, data=options.data)
         self.site_editor = SiteEditor(sites)
         self.polling = Polling(self.office.store)
+        self.scope = ScopeDesk(
+            self.office.captures, self.journal, self.stamper, lambda: self.polling.plan, self._all_twins
+        )
         self.connection: Connection | None = None
         self.motion: MotionDesk | None = None
         self.battery_archive = BatteryArchive(self.office.store, self.stamper)
@@ -185,6 +189,7 @@ class Bench:
     async def close(self) -> None:
         """End the connection at the end of the server, then the office. A restore that runs stays open, incomplete."""
         await self.restores.close()
+        await self.scope.close()
         await self.disconnect(self.options.person)
         if self.desk is not None:
             await self.desk.close()
@@ -195,6 +200,7 @@ class Bench:
         connection = self.connection
         if connection is None:
             return
+        await self.scope.detach()
         await self._end_look()
         await self._keep(self.office.visits.keep_left(connection.targets, person))
         if self.batteries is not None:
@@ -208,6 +214,9 @@ class Bench:
         self.epoch += 1
         self.journal.by(person).note(Kind.DISCONNECTED, None, turbine=connection.turbine.name)
         await connection.close()
+
+    def _all_twins(self) -> bool:
+        return self.twins is not None and self.twins.all_twins()
 
     def _slug_of(self, node: int) -> str | None:
         targets = () if self.connection is None else self.connection.targets

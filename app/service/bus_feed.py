@@ -68,10 +68,14 @@ class BusFeed:
             self.trace.gap(t_ns, reason)
             records = self.decoder.gap(t_ns, reason)
             self.trace.heard(records)
+            self._missed(records)
             self._live.apply_all(records)
 
     def _heard(self, records: Sequence[Record]) -> None:
         """What the frames told, before the live state takes it."""
+
+    def _missed(self, records: Sequence[Record]) -> None:
+        """What a gap told, before the live state takes it."""
 
     def bus_load(self, now_ns: int) -> float:
         """Load of the last second, 0..1."""

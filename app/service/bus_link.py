@@ -28,6 +28,10 @@ class FrameSink(Protocol):
         """Take a batch."""
 
 
+Listener = Callable[[Sequence[Record]], None]
+"""Hears what the frames say, gaps too, on the driver's receive thread; never raises and never waits."""
+
+
 class BusLink(BusFeed):
     """A CANopen bus: what its driver hears goes to the recorder first.
 
@@ -50,8 +54,7 @@ class BusLink(BusFeed):
         self.adapter = config.connection
         self.sink: FrameSink | None = None
         self.foreign: ForeignWrites | None = None
-        self.listeners: tuple[Callable[[Sequence[Record]], None], ...] = ()
-        """Told what the frames say, on the driver's receive thread; must not block."""
+        self.listeners: tuple[Listener, ...] = ()
         self.driver: Any = driver_class(Bus.CANOPEN)(
             can,
             stamper,
@@ -78,8 +81,22 @@ class BusLink(BusFeed):
     def _heard(self, records: Sequence[Record]) -> None:
         if self.foreign is not None:
             self.foreign.heard(records)  # before the live state: it still knows what was there
+        self._tell(records)
+
+    def _missed(self, records: Sequence[Record]) -> None:
+        self._tell(records)
+
+    def _tell(self, records: Sequence[Record]) -> None:
         for listener in self.listeners:
             listener(records)
+
+    def listen(self, listener: Listener) -> None:
+        """Have ``listener`` told from now on."""
+        self.listeners = (*self.listeners, listener)
+
+    def unlisten(self, listener: Listener) -> None:
+        """Tell it no longer; nothing happens where it is not told."""
+        self.listeners = tuple(one for one in self.listeners if one != listener)
 
     @property
     def status(self) -> DriverStatus:

@@ -54,6 +54,8 @@ class Kind(Enum):
     FAULT_RESET = "fault_reset"
     HOMED = "homed"
     INCIDENT_MADE = "incident_made"
+    SCOPE_ARMED = "scope_armed"
+    SCOPE_CAPTURED = "scope_captured"
     RESTORE_BEGUN = "restore_begun"
     RESTORE_CONFIRMED = "restore_confirmed"
     RESTORE_TURNED_BACK = "restore_turned_back"
@@ -123,6 +125,7 @@ _DONE: Final = (
     Kind.FAULT_RESET,
     Kind.HOMED,
     Kind.INCIDENT_MADE,
+    Kind.SCOPE_ARMED,
     Kind.RESTORE_BEGUN,
     Kind.RESTORE_CONFIRMED,
     Kind.RESTORE_TURNED_BACK,

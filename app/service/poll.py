@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Final
 
 from app.errors import HubsideError, SdoAbortError
@@ -36,20 +36,32 @@ _LASTING: Final = frozenset({Abort.NO_OBJECT, Abort.NO_SUB_INDEX, Abort.WRITE_ON
 
 
 class Poller:
-    """Reads on behalf of the screens until ``close``; ``plan`` is asked in every round, so a change counts at once."""
+    """Reads on behalf of the screens until ``close``; ``plan`` is asked in every round, so a change counts at once.
 
-    def __init__(self, connection: Connection, plan: Callable[[], PollPlan] = lambda: USUAL) -> None:
+    ``targets`` None: all devices of the connection.
+    """
+
+    def __init__(
+        self,
+        connection: Connection,
+        plan: Callable[[], PollPlan] = lambda: USUAL,
+        targets: Sequence[Target] | None = None,
+    ) -> None:
         self._connection = connection
         self._plan = plan
-        self._tasks = [asyncio.create_task(self._poll(target)) for target in connection.targets]
+        self._targets = tuple(connection.targets if targets is None else targets)
+        self._tasks = [asyncio.create_task(self._poll(target)) for target in self._targets]
+
+    def halt(self) -> None:
+        """End polling soon; ``close`` waits for it."""
+        for task in self._tasks:
+            task.cancel()
 
     async def close(self) -> None:
         """End polling."""
-        for task in self._tasks:
-            task.cancel()
-        for target, end in zip(
-            self._connection.targets, await asyncio.gather(*self._tasks, return_exceptions=True), strict=True
-        ):
+        self.halt()
+        ends = await asyncio.gather(*self._tasks, return_exceptions=True)
+        for target, end in zip(self._targets, ends, strict=True):
             if isinstance(end, Exception):
                 log.error("polling %s had ended by a defect", target.slug, exc_info=end)
 
@@ -73,7 +85,7 @@ class Poller:
                     era = self._era(target)
                     refused.clear()
                 answers = await self._read(target, [address for address in wanted if address not in refused])
-                refused.update(address for address, answer in answers.items() if _is_lasting(address, answer))
+                refused.update(address for address, answer in answers.items() if is_lasting(address, answer))
             turn += 1
             due = max(due + plan.period_s, loop.time())
             await asyncio.sleep(due - loop.time())
@@ -139,7 +151,7 @@ class Poller:
         return self._connection.stamper() - value.reading.t_ns < PDO_QUIET_NS
 
 
-def _is_lasting(address: Address, answer: bytes | HubsideError) -> bool:
+def is_lasting(address: Address, answer: bytes | HubsideError) -> bool:
     """True for a refusal that the next request would meet as well; a name that is refused once is refused always."""
     return isinstance(answer, SdoAbortError) and (address == DEVICE_NAME or answer.abort_code in _LASTING)
 

@@ -196,6 +196,13 @@ STEPS: Final[tuple[tuple[str, ...], ...]] = (
             for doing in ("UPDATE", "DELETE")
         ),
     ),
+    (
+        """CREATE TABLE scope_captures (
+            id TEXT PRIMARY KEY NOT NULL, trigger_ns INTEGER NOT NULL, head TEXT NOT NULL, samples BLOB NOT NULL,
+            in_force TEXT NOT NULL
+        ) STRICT""",
+        "CREATE INDEX scope_captures_time ON scope_captures (trigger_ns)",
+    ),
 )
 SCHEMA: Final = len(STEPS)
 """The version that this program writes."""

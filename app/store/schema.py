@@ -370,3 +370,13 @@ signal_runs = Table(
     Column("content", Text, nullable=False),
 )
 """Test signals that were run. ``content`` is JSON. Rows never change."""
+scope_captures = Table(
+    "scope_captures",
+    metadata,
+    Column("id", Text, primary_key=True),
+    Column("trigger_ns", Integer, nullable=False),
+    Column("head", Text, nullable=False),
+    Column("samples", LargeBinary, nullable=False),
+    Column("in_force", Text, nullable=False),
+)
+"""``head`` and ``in_force`` are JSON, ``samples`` packed arrays (``service.scope.capture``)."""

@@ -28,6 +28,7 @@ ALSO_IN_REPLAY: Final[tuple[tuple[str, str], ...]] = (
     ("POST", "/api/live/motion/lease/withdraw"),
     ("POST", "/api/live/motion/lease/answer"),
     ("POST", "/api/live/motion/lease/give-back"),
+    ("POST", "/api/live/scope/stop"),
     ("DELETE", "/api/live/jobs/{job_id}"),
     ("POST", "/api/live/restores/{restore_id}/give-up"),
     # who asks, people, notes of the visit
@@ -60,6 +61,8 @@ ALSO_IN_REPLAY: Final[tuple[tuple[str, str], ...]] = (
     ("POST", "/api/incidents/import"),
     ("PUT", "/api/incidents/{key}"),
     ("DELETE", "/api/incidents/{key}"),
+    ("PATCH", "/api/scope/captures/{capture_id}"),
+    ("DELETE", "/api/scope/captures/{capture_id}"),
     ("POST", "/api/search"),
     ("POST", "/api/search/signature"),
     ("DELETE", "/api/search/{job_id}"),

@@ -72,6 +72,8 @@ _STATUS: Final[tuple[tuple[type[HubsideError], HTTPStatus], ...]] = (
     (errors.PdoChangedError, HTTPStatus.CONFLICT),
     (errors.PdoBusyError, HTTPStatus.CONFLICT),
     (errors.PdoNoUndoError, HTTPStatus.CONFLICT),
+    (errors.ScopeStateError, HTTPStatus.CONFLICT),
+    (errors.ScopeUnknownError, HTTPStatus.NOT_FOUND),
     (errors.RefusedError, HTTPStatus.UNPROCESSABLE_ENTITY),
     (errors.ColumnError, HTTPStatus.NOT_FOUND),
     (errors.StoreError, HTTPStatus.SERVICE_UNAVAILABLE),

@@ -59,6 +59,8 @@ REFUSED_IN_REPLAY = {
     ("POST", "/api/live/motion/lease"),
     ("POST", "/api/live/motion/lease/ask"),
     ("POST", "/api/live/motion/confirm"),
+    ("POST", "/api/live/scope/arm"),
+    ("POST", "/api/live/scope/trigger"),
     ("POST", "/api/live/writes"),
     ("POST", "/api/live/writes/plan"),
     ("POST", "/api/live/backup"),

@@ -35,11 +35,11 @@ class Courses:
         self._seen: dict[Address, list[tuple[int, bytes]]] = {address: [] for address in SEEN}
 
     def __enter__(self) -> Courses:
-        self._link.listeners = (*self._link.listeners, self._heard)
+        self._link.listen(self._heard)
         return self
 
     def __exit__(self, _kind: type[BaseException] | None, _e: BaseException | None, _tb: TracebackType | None) -> None:
-        self._link.listeners = tuple(one for one in self._link.listeners if one != self._heard)
+        self._link.unlisten(self._heard)
 
     def _heard(self, records: Sequence[Record]) -> None:
         node = self._target.node

@@ -185,7 +185,7 @@ class Probes:
                     if isinstance(raw, int):
                         loop.call_soon_threadsafe(probe.take, record.t_ns, record.address, raw)
 
-        link.listeners = (*link.listeners, heard)
+        link.listen(heard)
         try:
             while loop.time() - self._looked_s[target.slug] < AWAY_S:
                 if self._allowed(target):
@@ -194,7 +194,7 @@ class Probes:
                         await self._connection.driver(target).read_many(target.node, _SEEN)
                 await asyncio.sleep(LOOK_S)
         finally:
-            link.listeners = tuple(one for one in link.listeners if one is not heard)
+            link.unlisten(heard)
 
     def _allowed(self, target: Target) -> bool:
         """As for all polling: the bus has room, and nobody else talks to the device."""

@@ -72,6 +72,8 @@ class Action(Enum):
     ANNOTATION_CHANGED = "annotation_changed"
     ANNOTATION_REMOVED = "annotation_removed"
     ANNOTATIONS_MERGED = "annotations_merged"
+    CAPTURE_CHANGED = "capture_changed"
+    CAPTURE_DELETED = "capture_deleted"
 
     @property
     def text_key(self) -> str:

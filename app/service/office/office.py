@@ -14,11 +14,12 @@ from app.service.office.audit import AuditLog
 from app.service.office.sessions import Sessions
 from app.service.office.users import Users
 from app.service.office.visits import Visits
+from app.service.scope.captures import Captures
 from app.store.store import Store
 
 
 class Office:
-    """Audit log, users, sessions, visits, motors, incidents and test signals of ``store``. ``stamp`` gives t_ns.
+    """Audit log, users, visits, motors, incidents, test signals and captures of ``store``. ``stamp`` gives t_ns.
 
     Every event of ``journal`` is audited. ``person`` is who a launch token lets in. Raises StoreError. Belongs to the
     event loop, and owns the store.
@@ -35,6 +36,7 @@ class Office:
         self.incidents = Incidents(store, self.audit, stamp, journal)
         self.annotations = Annotations(store, self.audit, stamp)
         self.signal_runs = SignalRuns(store, stamp)
+        self.captures = Captures(store, self.audit)
         self._stop_listening = journal.listen(self.audit.take)
 
     async def close(self) -> None:

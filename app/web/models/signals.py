@@ -103,7 +103,7 @@ class SignalResults(BaseModel):
     most_following_deg: float | None
 
 
-class InForceDoc(BaseModel):
+class HeldDoc(BaseModel):
     """A parameter as it stood before the run."""
 
     address: str
@@ -169,7 +169,7 @@ class SignalRunDoc(SignalRunLine):
     sent: int
     late: int
     start_deg: float
-    in_force: list[InForceDoc]
+    in_force: list[HeldDoc]
     proposal: ProposalDoc | None
     courses: dict[str, CourseDoc]
 

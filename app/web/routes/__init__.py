@@ -25,6 +25,7 @@ from app.web.routes import (
     replay_views,
     restore,
     rules,
+    scope,
     session,
     sets,
     settings,
@@ -66,6 +67,7 @@ FEATURES = (
     desk,
     analysis,
     incidents,
+    scope,
 )
 
 

@@ -1798,6 +1798,106 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/live/scope": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Scope
+         * @description What the scope does, and how fast its signals come.
+         */
+        get: operations["scope"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/live/scope/arm": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Arm Scope
+         * @description Arm it; what was armed before ends.
+         */
+        post: operations["arm_scope"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/live/scope/stop": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Stop Scope
+         * @description End it; a capture under way is kept as far as it came.
+         */
+        post: operations["stop_scope"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/live/scope/trigger": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Trigger Scope
+         * @description Begin a capture now.
+         */
+        post: operations["trigger_scope"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/live/scope/view": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Scope Preview
+         * @description The last seconds of what it sees, while it is armed.
+         */
+        get: operations["scope_preview"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/live/stop": {
         parameters: {
             query?: never;
@@ -2972,6 +3072,174 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/scope/captures": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Captures
+         * @description All captures, the latest first.
+         */
+        get: operations["captures"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/scope/captures/{capture_id}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Capture
+         * @description One capture without its values.
+         */
+        get: operations["capture"];
+        put?: never;
+        post?: never;
+        /**
+         * Delete Capture
+         * @description Forget it.
+         */
+        delete: operations["delete_capture"];
+        options?: never;
+        head?: never;
+        /**
+         * Change Capture
+         * @description Give it a name and a note.
+         */
+        patch: operations["change_capture"];
+        trace?: never;
+    };
+    "/api/scope/captures/{capture_id}/csv": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Capture Csv
+         * @description Its values as CSV: a row an instant, a column a signal.
+         */
+        get: operations["capture_csv"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/scope/captures/{capture_id}/json": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Capture Json
+         * @description All of it as JSON.
+         */
+        get: operations["capture_json"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/scope/captures/{capture_id}/parameters": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Capture Parameters
+         * @description The parameter values that were in force, each beside what is known now.
+         */
+        get: operations["capture_parameters"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/scope/captures/{capture_id}/series": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Capture Values
+         * @description Its signals over time: every value where they are few, else least and greatest.
+         */
+        get: operations["capture_values"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/scope/captures/{capture_id}/spectrum": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Capture Spectrum
+         * @description The spectrum of one signal of it, of a stretch or of all.
+         */
+        get: operations["capture_spectrum"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/scope/captures/{capture_id}/xy": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Capture Xy
+         * @description One signal of it against another, matched by time.
+         */
+        get: operations["capture_xy"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/search": {
         parameters: {
             query?: never;
@@ -3773,6 +4041,52 @@ export interface components {
             type: "any";
         };
         /**
+         * ArmRequest
+         * @description Signals ``<device>/<address>`` or ``<device>/<address>.<bit>``; ``pre_s`` of ``total_s`` lie before the trigger.
+         *
+         *     ``hold_off_s``: so long after a capture no trigger counts. ``auto_s``: in mode auto, how long one is waited for.
+         * @example {
+         *       "mode": "single",
+         *       "pre_s": 1,
+         *       "signals": [
+         *         "wtg-07/blade-1/pmc/6064",
+         *         "wtg-07/blade-1/pmc/6041.3"
+         *       ],
+         *       "total_s": 4,
+         *       "trigger": {
+         *         "kind": "edge",
+         *         "level": 45,
+         *         "signal": "wtg-07/blade-1/pmc/6064",
+         *         "slope": "falling"
+         *       }
+         *     }
+         */
+        ArmRequest: {
+            /**
+             * Auto S
+             * @default 2
+             */
+            auto_s: number;
+            /**
+             * Hold Off S
+             * @default 0
+             */
+            hold_off_s: number;
+            /**
+             * Mode
+             * @default single
+             * @enum {string}
+             */
+            mode: "single" | "normal" | "auto";
+            /** Pre S */
+            pre_s: number;
+            /** Signals */
+            signals: string[];
+            /** Total S */
+            total_s: number;
+            trigger: components["schemas"]["TriggerIn"];
+        };
+        /**
          * AssignedDoc
          * @description Which motor a device drives, as somebody said or as it was put into the device.
          */
@@ -4278,6 +4592,32 @@ export interface components {
             interface: string;
             /** Name */
             name: string;
+        };
+        /**
+         * CaptureChange
+         * @description Name and note of a capture; one that was not kept yet is kept by it.
+         * @example {
+         *       "name": "blade 1, brake test",
+         *       "note": "after greasing"
+         *     }
+         */
+        CaptureChange: {
+            /** Name */
+            name: string;
+            /**
+             * Note
+             * @default
+             */
+            note: string;
+        };
+        /**
+         * CaptureDoc
+         * @description A capture without its values. Not ``kept``: it goes with the next one, or with the server.
+         */
+        CaptureDoc: {
+            head: components["schemas"]["Head"];
+            /** Kept */
+            kept: boolean;
         };
         /**
          * CellDoc
@@ -5291,6 +5631,53 @@ export interface components {
             v: 1;
         };
         /**
+         * Head
+         * @description All of a capture but its values. Times are t_ns; ``known_ns``: from here on all was seen.
+         *
+         *     ``recording`` is the file that was written at the trigger, None where nothing was recorded.
+         */
+        Head: {
+            /** Cause */
+            cause: string;
+            /** Devices */
+            devices: components["schemas"]["KeptDevice"][];
+            /** End Ns */
+            end_ns: number;
+            /** Ended */
+            ended: string;
+            /** Id */
+            id: string;
+            /** Known Ns */
+            known_ns: number;
+            /** Made Ns */
+            made_ns: number;
+            /** Marks */
+            marks: components["schemas"]["KeptMark"][];
+            /** Name */
+            name: string;
+            /** Note */
+            note: string;
+            order: components["schemas"]["ScopeOrder"];
+            /** Person */
+            person: string;
+            /** Recording */
+            recording: string | null;
+            /** Signals */
+            signals: components["schemas"]["KeptSignal"][];
+            /** Size Bytes */
+            size_bytes: number;
+            /** Start Ns */
+            start_ns: number;
+            /** Trigger Ns */
+            trigger_ns: number;
+            /** Turbine */
+            turbine: string;
+            /** Turbine Name */
+            turbine_name: string;
+            /** Twin */
+            twin: boolean;
+        };
+        /**
          * HeardDoc
          * @description What a test has heard so far; ``load`` 0..1.
          */
@@ -5350,6 +5737,22 @@ export interface components {
              * @constant
              */
             v: 1;
+        };
+        /**
+         * HeldDoc
+         * @description A parameter as it stood before the run.
+         */
+        HeldDoc: {
+            /** Address */
+            address: string;
+            /** Name */
+            name: string;
+            /** Raw */
+            raw: number;
+            /** Shown */
+            shown: string;
+            /** Unit */
+            unit: string;
         };
         /**
          * Hello
@@ -5427,20 +5830,45 @@ export interface components {
             order: number;
         };
         /**
-         * InForceDoc
-         * @description A parameter as it stood before the run.
+         * InForce
+         * @description A value that stood in RAM at the trigger. ``stored`` None: what non-volatile memory holds was not known.
+         *
+         *     ``stale``: frames had been lost since it was seen. ``raw`` is the raw value as text.
          */
-        InForceDoc: {
+        InForce: {
             /** Address */
             address: string;
-            /** Name */
-            name: string;
+            /** Device */
+            device: string;
+            /** Name Key */
+            name_key: string | null;
+            /** Parameter */
+            parameter: boolean;
             /** Raw */
-            raw: number;
+            raw: string;
             /** Shown */
             shown: string;
+            /** Stale */
+            stale: boolean;
+            /** Stored */
+            stored: string | null;
+            /** Title */
+            title: string;
             /** Unit */
             unit: string;
+        };
+        /**
+         * InForceDoc
+         * @description A value that was in force, and what is known now; ``differs`` None: nothing is known now to compare it with.
+         */
+        InForceDoc: {
+            /** Differs */
+            differs: boolean | null;
+            /** Now Raw */
+            now_raw: string | null;
+            /** Now Shown */
+            now_shown: string | null;
+            was: components["schemas"]["InForce"];
         };
         /**
          * IncidentChange
@@ -5749,6 +6177,70 @@ export interface components {
             order: number;
             /** Speed Dps */
             speed_dps: number;
+        };
+        /**
+         * KeptDevice
+         * @description Who a device was, as far as it had said; ``values`` parameters were known of it, ``unknown`` not.
+         */
+        KeptDevice: {
+            /** Description Id */
+            description_id: string;
+            /** Description Version */
+            description_version: string;
+            /** Device */
+            device: string;
+            /** Device Name */
+            device_name: string | null;
+            /** Serial */
+            serial: number | null;
+            /** Software */
+            software: string | null;
+            /** Unknown */
+            unknown: number;
+            /** Values */
+            values: number;
+        };
+        /**
+         * KeptMark
+         * @description Something that happened. ``device`` None: it is about a whole bus. ``detail`` as in ``engine.Mark``.
+         */
+        KeptMark: {
+            /** Bus */
+            bus: string;
+            /** Detail */
+            detail: string;
+            /** Device */
+            device: string | null;
+            /** T Ns */
+            t_ns: number;
+            /** What */
+            what: string;
+        };
+        /**
+         * KeptSignal
+         * @description A signal of a capture. ``count`` values, ``by_pdo`` of them by a PDO; ``scaled = raw x scale`` in ``unit``.
+         */
+        KeptSignal: {
+            /** Bit */
+            bit: number | null;
+            /** Bit Key */
+            bit_key: string | null;
+            /** Bus */
+            bus: string;
+            /** By Pdo */
+            by_pdo: number;
+            /** Count */
+            count: number;
+            /** Device */
+            device: string;
+            /** Name */
+            name: string;
+            /** Scale */
+            scale: string;
+            /** Title */
+            title: string;
+            /** Unit */
+            unit: string;
         };
         /**
          * KeyEventDoc
@@ -7222,6 +7714,16 @@ export interface components {
             unread: string[];
         };
         /**
+         * Peak
+         * @description A local maximum: Hz, and the amplitude in the signal's unit.
+         */
+        Peak: {
+            /** Amplitude */
+            amplitude: number;
+            /** Frequency Hz */
+            frequency_hz: number;
+        };
+        /**
          * PlaceDoc
          * @description One kind of adapter, and how the look for it ended.
          */
@@ -8532,6 +9034,97 @@ export interface components {
             node?: number | null;
         };
         /**
+         * ScopeLine
+         * @description The scope. ``available``: a turbine is connected. Times are t_ns.
+         *
+         *     ``captures``: those of this arming, oldest first. ``reason_key``: why it ended by itself. ``filled``: share of its
+         *     memory, 0..1. ``unreadable``: values whose length is not their type's.
+         */
+        ScopeLine: {
+            /** Armed Ns */
+            armed_ns: number | null;
+            /** Available */
+            available: boolean;
+            /** Captures */
+            captures: string[];
+            /** End Ns */
+            end_ns: number | null;
+            /** Filled */
+            filled: number;
+            /** Now Ns */
+            now_ns: number;
+            order: components["schemas"]["ScopeOrder"] | null;
+            /** Person */
+            person: string;
+            /**
+             * Phase
+             * @enum {string}
+             */
+            phase: "idle" | "waiting" | "capturing" | "done";
+            /** Reason Key */
+            reason_key: string | null;
+            /** Signals */
+            signals: components["schemas"]["SignalRate"][];
+            /** Trigger Ns */
+            trigger_ns: number | null;
+            /** Unreadable */
+            unreadable: number;
+        };
+        /**
+         * ScopeOrder
+         * @description The setting of a scope, as a person made it. Times in s; ``pre_s`` of ``total_s`` lie before the trigger.
+         */
+        ScopeOrder: {
+            /** Auto S */
+            auto_s: number;
+            /** Hold Off S */
+            hold_off_s: number;
+            /**
+             * Mode
+             * @enum {string}
+             */
+            mode: "single" | "normal" | "auto";
+            /** Pre S */
+            pre_s: number;
+            /** Signals */
+            signals: string[];
+            /** Total S */
+            total_s: number;
+            trigger: components["schemas"]["TriggerOrder"];
+        };
+        /**
+         * ScopeSeries
+         * @description One signal over time, s since the trigger. ``exact``: every value, with ``low`` the same as ``high``.
+         *
+         *     Else least and greatest of buckets of ``bucket_s``. None is a break: from there nothing is known.
+         */
+        ScopeSeries: {
+            /** Bucket S */
+            bucket_s: number;
+            /** Exact */
+            exact: boolean;
+            /** High */
+            high: (number | null)[];
+            /** Low */
+            low: (number | null)[];
+            /** Signal */
+            signal: string;
+            /** T S */
+            t_s: number[];
+        };
+        /**
+         * ScopeView
+         * @description What came last, s before ``now_ns``. None where nothing is armed.
+         */
+        ScopeView: {
+            /** Now Ns */
+            now_ns: number;
+            /** Series */
+            series: components["schemas"]["ScopeSeries"][];
+            /** Span S */
+            span_s: number;
+        };
+        /**
          * SdoLine
          * @description One SDO transfer. ``ours``: the bench was its client. ``abort`` fills a text, as in the trace.
          */
@@ -8930,6 +9523,33 @@ export interface components {
             unit: string;
         };
         /**
+         * SignalRate
+         * @description How one signal comes: by PDO, every value; polled; or not at all just now. ``rate_hz`` is measured.
+         */
+        SignalRate: {
+            /** Bit */
+            bit: number | null;
+            /** Bit Key */
+            bit_key: string | null;
+            /** Device */
+            device: string;
+            /** Name */
+            name: string;
+            /** Rate Hz */
+            rate_hz: number;
+            /** Scale */
+            scale: string;
+            /** Title */
+            title: string;
+            /** Unit */
+            unit: string;
+            /**
+             * Way
+             * @enum {string}
+             */
+            way: "pdo" | "polled" | "silent";
+        };
+        /**
          * SignalRequest
          * @description Run a test signal while it is held.
          * @example {
@@ -8981,7 +9601,7 @@ export interface components {
             /** Id */
             id: string;
             /** In Force */
-            in_force: components["schemas"]["InForceDoc"][];
+            in_force: components["schemas"]["HeldDoc"][];
             /** Interpolation Ms */
             interpolation_ms: number;
             /** Late */
@@ -9257,6 +9877,39 @@ export interface components {
          * @enum {string}
          */
         Special: "trip" | "error" | "warning";
+        /**
+         * Spectrum
+         * @description Amplitudes by frequency, the greatest of each of at most some thousand steps.
+         *
+         *     ``values`` were used from ``from_s`` to ``to_s``, on a grid of ``rate_hz``. ``unevenness``: by how much of the step
+         *     the distances of neighbours deviate (standard deviation); 0 is equidistant. ``mean`` was taken off.
+         */
+        Spectrum: {
+            /** Amplitude */
+            amplitude: number[];
+            /** Frequency Hz */
+            frequency_hz: number[];
+            /** From S */
+            from_s: number;
+            /** Mean */
+            mean: number;
+            /** Peaks */
+            peaks: components["schemas"]["Peak"][];
+            /** Rate Hz */
+            rate_hz: number;
+            /** Resolution Hz */
+            resolution_hz: number;
+            /** Signal */
+            signal: string;
+            /** To S */
+            to_s: number;
+            /** Unevenness */
+            unevenness: number;
+            /** Unit */
+            unit: string;
+            /** Values */
+            values: number;
+        };
         /**
          * StationFindings
          * @description One station: the devices that were judged together, and the findings, the gravest first.
@@ -9713,6 +10366,59 @@ export interface components {
             unit: string;
         };
         /**
+         * TriggerIn
+         * @description What is waited for; what a kind does not need is left out. ``level`` is in the unit of ``signal``.
+         */
+        TriggerIn: {
+            /** Code */
+            code?: number | null;
+            /** Device */
+            device?: string | null;
+            /** Event */
+            event?: ("emcy" | "boot_up" | "nmt" | "axis_state" | "bit") | null;
+            /**
+             * Kind
+             * @enum {string}
+             */
+            kind: "manual" | "edge" | "level" | "event" | "fault";
+            /** Level */
+            level?: number | null;
+            /** Side */
+            side?: ("above" | "below") | null;
+            /** Signal */
+            signal?: string | null;
+            /** Slope */
+            slope?: ("rising" | "falling" | "either") | null;
+        };
+        /**
+         * TriggerOrder
+         * @description What is waited for; what a kind does not need is None.
+         *
+         *     ``signal`` with ``level`` in its unit: edge and level; a bit as ``signal``: event ``bit``. ``device`` None: any.
+         *     ``code``: of an emergency message; None any but 0.
+         */
+        TriggerOrder: {
+            /** Code */
+            code: number | null;
+            /** Device */
+            device: string | null;
+            /** Event */
+            event: ("emcy" | "boot_up" | "nmt" | "axis_state" | "bit") | null;
+            /**
+             * Kind
+             * @enum {string}
+             */
+            kind: "manual" | "edge" | "level" | "event" | "fault";
+            /** Level */
+            level: number | null;
+            /** Side */
+            side: ("above" | "below") | null;
+            /** Signal */
+            signal: string | null;
+            /** Slope */
+            slope: ("rising" | "falling" | "either") | null;
+        };
+        /**
          * TripDoc
          * @description One trip. ``t0_ns`` is the moment at which the safety chain opened or an axis faulted.
          *
@@ -10150,6 +10856,22 @@ export interface components {
             expected_raw?: number | string | null;
             /** Raw */
             raw: number | string;
+        };
+        /**
+         * XyPoints
+         * @description One signal against another. ``instants`` there were in all; where there are too many, every n-th is told.
+         */
+        XyPoints: {
+            /** Every */
+            every: number;
+            /** Instants */
+            instants: number;
+            /** T S */
+            t_s: number[];
+            /** X */
+            x: (number | null)[];
+            /** Y */
+            y: (number | null)[];
         };
     };
     responses: never;
@@ -17963,6 +18685,300 @@ export interface operations {
             };
         };
     };
+    scope: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ScopeLine"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    arm_scope: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "mode": "single",
+                 *       "pre_s": 1,
+                 *       "signals": [
+                 *         "wtg-07/blade-1/pmc/6064",
+                 *         "wtg-07/blade-1/pmc/6041.3"
+                 *       ],
+                 *       "total_s": 4,
+                 *       "trigger": {
+                 *         "kind": "edge",
+                 *         "level": 45,
+                 *         "signal": "wtg-07/blade-1/pmc/6064",
+                 *         "slope": "falling"
+                 *       }
+                 *     }
+                 */
+                "application/json": components["schemas"]["ArmRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ScopeLine"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Conflict */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    stop_scope: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ScopeLine"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    trigger_scope: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ScopeLine"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Conflict */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    scope_preview: {
+        parameters: {
+            query?: {
+                points?: number;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ScopeView"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
     stop: {
         parameters: {
             query?: never;
@@ -22151,6 +23167,642 @@ export interface operations {
             };
             /** @description Forbidden */
             403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    captures: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["CaptureDoc"][];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    capture: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                capture_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["CaptureDoc"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    delete_capture: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                capture_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Nothing"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    change_capture: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                capture_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "name": "blade 1, brake test",
+                 *       "note": "after greasing"
+                 *     }
+                 */
+                "application/json": components["schemas"]["CaptureChange"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["CaptureDoc"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    capture_csv: {
+        parameters: {
+            query?: {
+                language?: ("en" | "de") | null;
+            };
+            header?: never;
+            path: {
+                capture_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    capture_json: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                capture_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    capture_parameters: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                capture_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["InForceDoc"][];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    capture_values: {
+        parameters: {
+            query?: {
+                from_s?: number | null;
+                to_s?: number | null;
+                points?: number;
+            };
+            header?: never;
+            path: {
+                capture_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ScopeSeries"][];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    capture_spectrum: {
+        parameters: {
+            query: {
+                signal: string;
+                from_s?: number | null;
+                to_s?: number | null;
+            };
+            header?: never;
+            path: {
+                capture_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Spectrum"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    capture_xy: {
+        parameters: {
+            query: {
+                x: string;
+                y: string;
+                from_s?: number | null;
+                to_s?: number | null;
+                points?: number;
+            };
+            header?: never;
+            path: {
+                capture_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["XyPoints"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
                 headers: {
                     [name: string]: unknown;
                 };

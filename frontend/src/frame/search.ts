@@ -112,6 +112,17 @@ export interface PageSearch {
   /** What is laid over: recordings with their zeros, and the signals of all of them (pages/recordings/overlay/choice.ts). */
   overlay?: string;
   curves?: string;
+  /** Of the scope: signals without their turbine, the capture that is open, "fft" or "xy", captures laid over. */
+  channels?: string;
+  capture?: string;
+  measure?: string;
+  refs?: string;
+  /** Its stretch in view and its two cursors, in s since the trigger ("-0.5..1.5"). */
+  zoom?: string;
+  cursors?: string;
+  /** The signal of its spectrum, and the two of its XY ("x,y"). */
+  spectrum?: string;
+  xy?: string;
 }
 
 const TEXTS = [
@@ -173,6 +184,14 @@ const TEXTS = [
   "loop",
   "overlay",
   "curves",
+  "channels",
+  "capture",
+  "measure",
+  "refs",
+  "zoom",
+  "cursors",
+  "spectrum",
+  "xy",
 ] as const;
 
 /**

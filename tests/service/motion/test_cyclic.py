@@ -276,7 +276,7 @@ async def test_a_limit_refuses_before_anything_is_sent(connection: Connection) -
             written.extend(one for one in records if isinstance(one, SdoSeen) and one.access is SdoAccess.WRITE)
 
         link = connection.buses["can0"]
-        link.listeners = (*link.listeners, heard)
+        link.listen(heard)
         with pytest.raises(LimitError) as refused:
             await play(desk, AXIS, page.fence, replace(SINE, amplitude_deg=-3.0), connection.journal)
         assert refused.value.details["unit"] in ("°/s", "°/s²")

@@ -6,11 +6,31 @@ import { TabbedRoom } from "../../ui/TabbedRoom";
 const TABS = {
   move: lazy(async () => ({ default: (await import("./AxisPage")).AxisPage })),
   setup: lazy(async () => ({ default: (await import("./setup/SetupTab")).SetupTab })),
+  scope: lazy(async () => ({ default: (await import("./scope/ScopeTab")).ScopeTab })),
   pdo: lazy(async () => ({ default: (await import("./pdo/PdoTab")).PdoTab })),
 };
 
 /** What belongs to one tab. */
-const OWN = ["span", "picture", "pdo", "review", "findings", "gear", "ae"] as const;
+const OWN = [
+  "span",
+  "picture",
+  "pdo",
+  "review",
+  "findings",
+  "gear",
+  "ae",
+  "channels",
+  "capture",
+  "measure",
+  "refs",
+  "zoom",
+  "cursors",
+  "spectrum",
+  "xy",
+  "find",
+  "order",
+  "less",
+] as const;
 
 /** One axis: what it does and what moves it, what sets it up, and what measures it. */
 export function AxisRoom() {

@@ -1,0 +1,306 @@
+"""The scope of a bench: one for all who look. It is armed for a connection, and what it catches is kept.
+
+Everything here runs in the event loop; only ``Tap.hear`` runs on receive threads.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Final
+
+from app.errors import HubsideError, ScopeStateError
+from app.model.address import Address
+from app.model.sets import iso_time
+from app.service.connection import Connection
+from app.service.journal import Journal, Kind
+from app.service.polling import PollPlan
+from app.service.scope.capture import Capture, Head, KeptMark, KeptSignal, Values
+from app.service.scope.captures import Captures
+from app.service.scope.engine import Caught, Cause, Ended, Engine, Mark, Phase
+from app.service.scope.in_force import Frozen, in_force, who
+from app.service.scope.order import Plan, ScopeOrder, plan
+from app.service.scope.sampling import Sampling
+from app.service.scope.signals import number_of
+from app.service.scope.tap import Heard, Tap
+from app.service.scope.trigger import Happened, What
+from app.store.uuid7 import Uuid7
+from app.wire.records import BootUpSeen, EmcySeen, GapSeen, Source, ValueSeen
+
+log = logging.getLogger(__name__)
+
+TICK_S: Final = 0.05
+SHOWN_NS: Final = 10_000_000_000
+"""The live view spans so much."""
+MAX_CAPTURES: Final = 100
+"""Of one arming: then it stops."""
+_PDOS: Final = (Source.PDO_TX, Source.PDO_RX)
+
+
+@dataclass(frozen=True, slots=True)
+class AtTrigger:
+    """What was known of the devices when a trigger was seen, and the recording that was written."""
+
+    devices: tuple[Frozen, ...]
+    recording: str | None
+
+
+@dataclass
+class Run:
+    """From arming to the end. ``reason_key``: why it ended by itself, None where it did not."""
+
+    connection: Connection
+    order: ScopeOrder
+    plan: Plan
+    person: str
+    engine: Engine
+    tap: Tap
+    armed_ns: int
+    sampling: Sampling | None = None
+    ticker: asyncio.Task[None] | None = None
+    over: bool = False
+    reason_key: str | None = None
+    made: list[str] = field(default_factory=list)
+    seen: dict[int, AtTrigger] = field(default_factory=dict)
+    unreadable: int = 0
+
+
+class ScopeDesk:
+    """``polling`` gives the plan in force, ``twins`` whether all devices are simulated. ``close`` ends it."""
+
+    def __init__(
+        self,
+        captures: Captures,
+        journal: Journal,
+        stamper: Callable[[], int],
+        polling: Callable[[], PollPlan],
+        twins: Callable[[], bool],
+    ) -> None:
+        self.captures = captures
+        self.run: Run | None = None
+        self.now_ns = stamper
+        self._journal = journal
+        self._polling = polling
+        self._twins = twins
+        self._new_id = Uuid7(stamper)
+        self._keeping: set[asyncio.Task[None]] = set()
+        self._changing = asyncio.Lock()
+
+    # -- orders ------------------------------------------------------------------------
+
+    async def arm(self, connection: Connection, order: ScopeOrder, person: str) -> Run:
+        """Begin; what was armed before ends. Raises ScopeSettingsError; then nothing has changed."""
+        planned = plan(order, connection.target, connection.targets)
+        async with self._changing:
+            await self._end(Ended.STOPPED)
+            run = self._made(connection, order, planned, person)
+            self.run = run
+            for link in connection.buses.values():
+                link.listen(run.tap.hear)
+            run.sampling = Sampling(connection, _addresses(planned), self._polling)
+            run.ticker = asyncio.create_task(self._tick_forever(run))
+            self._journal.by(person).note(Kind.SCOPE_ARMED, None, signals=len(planned.signals))
+            return run
+
+    def _made(self, connection: Connection, order: ScopeOrder, planned: Plan, person: str) -> Run:
+        armed_ns = self.now_ns()
+        engine = Engine(planned.channels, planned.trigger, planned.timing, armed_ns, SHOWN_NS)
+        run: Run
+
+        def take(heard: Sequence[Heard]) -> None:
+            self._take(run, heard)
+
+        tap = Tap(planned.sources, asyncio.get_running_loop(), take)
+        run = Run(connection, order, planned, person, engine, tap, armed_ns)
+        return run
+
+    def trigger_now(self) -> None:
+        """Begin a capture by hand. Raises ScopeStateError."""
+        run = self.run
+        if run is None or run.over or not run.engine.trigger_now(self.now_ns()):
+            raise ScopeStateError(state_key="scope.state.not_waiting")
+        self._freeze(run)
+
+    async def stop(self) -> None:
+        """End it; what was under way is kept as far as it came. Nothing happens where nothing is armed."""
+        async with self._changing:
+            await self._end(Ended.STOPPED)
+
+    async def detach(self) -> None:
+        """The connection ends."""
+        async with self._changing:
+            run = self.run
+            if run is not None and not run.over:
+                run.reason_key = "scope.over.link"
+                await self._end(Ended.LINK)
+
+    async def close(self) -> None:
+        """End it, and have everything kept."""
+        await self.detach()
+        await asyncio.gather(*self._keeping, return_exceptions=True)
+
+    # -- what comes ------------------------------------------------------------------------
+
+    def _take(self, run: Run, heard: Sequence[Heard]) -> None:
+        if run.over:
+            return
+        engine, sources, types = run.engine, run.plan.sources, run.plan.types
+        for one in heard:
+            if type(one) is ValueSeen:
+                source = sources[(one.bus, one.node, one.address)]  # type: ignore[index]  # equal to a Place
+                raw = number_of(types[source], one.data)
+                if raw is None:
+                    run.unreadable += 1
+                else:
+                    engine.value(source, one.t_ns, raw, one.source in _PDOS)
+            elif isinstance(one, GapSeen):
+                engine.gap(one.t_ns, one.bus, one.reason)
+            else:
+                engine.happened(_happened(one))
+        self._freeze(run)
+
+    def _freeze(self, run: Run) -> None:
+        """What is known of the devices when a trigger was seen, once for each."""
+        window = run.engine.window
+        if window is not None and window.number not in run.seen:
+            concerned = {one.device for one in run.plan.signals}
+            device = run.order.trigger.device
+            if device is not None:
+                concerned.add(device)
+            targets = [one for one in run.connection.targets if one.slug in concerned]
+            recording = None if run.connection.recording is None else run.connection.recording.status().file
+            run.seen[window.number] = AtTrigger(
+                tuple(Frozen.of(target) for target in targets), None if recording is None else recording.name
+            )
+
+    async def _tick_forever(self, run: Run) -> None:
+        while not run.over:
+            self._keep_all(run, run.engine.advance(self.now_ns()))
+            self._freeze(run)  # a capture of AUTO may have begun
+            if len(run.made) >= MAX_CAPTURES:
+                run.reason_key = "scope.over.full"
+                self._release(run)
+            elif run.engine.phase is Phase.DONE:
+                self._release(run)
+            await asyncio.sleep(TICK_S)
+
+    async def _end(self, why: Ended) -> None:
+        run = self.run
+        if run is None:
+            return
+        if not run.over:
+            self._keep_all(run, run.engine.stop(self.now_ns(), why))
+            self._release(run)
+        if run.ticker is not None:
+            run.ticker.cancel()
+            await asyncio.gather(run.ticker, return_exceptions=True)
+        if run.sampling is not None:
+            await run.sampling.close()
+            run.sampling = None
+
+    def _release(self, run: Run) -> None:
+        """Listen and read no more."""
+        run.over = True
+        run.tap.closed = True
+        for link in run.connection.buses.values():
+            link.unlisten(run.tap.hear)
+        if run.sampling is not None:
+            run.sampling.halt()
+
+    # -- keeping -----------------------------------------------------------------------------
+
+    def _keep_all(self, run: Run, caught: Sequence[Caught]) -> None:
+        for one in caught:
+            seen = run.seen.pop(one.window.number, AtTrigger((), None))
+            head = self._head(run, one, seen)
+            if one.window.cause is not Cause.AUTO:
+                run.made.append(head.id)
+            task = asyncio.create_task(self._keep(run, Capture(head, _values(one)), seen.devices))
+            self._keeping.add(task)
+            task.add_done_callback(self._keeping.discard)
+
+    async def _keep(self, run: Run, capture: Capture, frozen: Sequence[Frozen]) -> None:
+        rows = await asyncio.to_thread(in_force, frozen)
+        if capture.head.cause == Cause.AUTO.value:
+            self.captures.show(capture, rows)
+            return
+        try:
+            head = await self.captures.keep(capture, rows)
+        except HubsideError as error:
+            log.warning("a capture could not be kept: %s", error)
+            self.captures.show(capture, rows)
+            run.reason_key = "scope.over.store"
+            return
+        self._journal.by(run.person).note(Kind.SCOPE_CAPTURED, None, capture=head.name, values=_count(head))
+
+    def _head(self, run: Run, caught: Caught, seen: AtTrigger) -> Head:
+        window, connection = caught.window, run.connection
+        slugs = {(one.device.bus, one.node): one.slug for one in connection.targets}
+        return Head(
+            id=self._new_id(),
+            name=iso_time(window.trigger_ns)[:19].replace("T", " "),
+            note="",
+            person=run.person,
+            turbine=connection.turbine.slug,
+            turbine_name=connection.turbine.name,
+            cause=window.cause.value,
+            ended=window.ended.value,
+            trigger_ns=window.trigger_ns,
+            start_ns=window.start_ns,
+            end_ns=window.end_ns,
+            known_ns=window.known_ns,
+            made_ns=self.now_ns(),
+            order=run.order,
+            signals=tuple(
+                KeptSignal(
+                    name=one.name,
+                    device=one.device,
+                    bus=one.place.bus,
+                    title=one.title,
+                    bit=one.bit,
+                    bit_key=one.bit_key,
+                    unit=one.unit,
+                    scale=str(one.scale),
+                    count=len(stretch.t_ns),
+                    by_pdo=stretch.by_pdo,
+                )
+                for one, stretch in zip(run.plan.signals, caught.stretches, strict=True)
+            ),
+            marks=tuple(_mark(one, slugs) for one in caught.marks),
+            devices=tuple(who(one) for one in seen.devices),
+            recording=seen.recording,
+            twin=self._twins(),
+            size_bytes=0,
+        )
+
+
+def _happened(one: Heard) -> Happened:
+    if isinstance(one, EmcySeen):
+        return Happened(one.t_ns, What.EMCY, one.bus, one.node, code=one.code)
+    if isinstance(one, BootUpSeen):
+        return Happened(one.t_ns, What.BOOT_UP, one.bus, one.node)
+    return Happened(one.t_ns, What.NMT, one.bus, one.node, state=getattr(one, "state", None))
+
+
+def _mark(mark: Mark, slugs: dict[tuple[str, int], str]) -> KeptMark:
+    return KeptMark(mark.t_ns, mark.what, mark.bus, slugs.get((mark.bus, mark.node)), mark.detail)
+
+
+def _values(caught: Caught) -> tuple[Values, ...]:
+    return tuple(Values(one.t_ns, one.raw) for one in caught.stretches)
+
+
+def _count(head: Head) -> int:
+    return sum(one.count for one in head.signals)
+
+
+def _addresses(planned: Plan) -> dict[str, list[Address]]:
+    """What is shown of each device."""
+    found: dict[str, list[Address]] = {}
+    for one in planned.signals:
+        own = found.setdefault(one.device, [])
+        if one.place.address not in own:
+            own.append(one.place.address)
+    return found

@@ -1,0 +1,62 @@
+"""While a scope is armed: what no PDO carries of its signals is read by SDO, as fast as the cap on the load allows."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Collection, Mapping
+from typing import Final
+
+from app.model.address import Address
+from app.service.connection import Connection
+from app.service.devices import Target
+from app.service.poll import LOOK_S, Poller, is_lasting
+from app.service.polling import PollPlan, read_bits
+
+LEAST_S: Final = 0.002
+"""A round never takes less, so that others get their turn."""
+LEAST_ROOM: Final = 0.02
+"""Share of the bus that is used at least while the load is under its cap."""
+
+
+class Sampling(Poller):
+    """Reads ``wanted`` of each device, by slug, round after round. Obeys what all polling obeys."""
+
+    def __init__(
+        self, connection: Connection, wanted: Mapping[str, Collection[Address]], plan: Callable[[], PollPlan]
+    ) -> None:
+        self._wanted = wanted
+        super().__init__(connection, plan, [one for one in connection.targets if wanted.get(one.slug)])
+
+    async def _poll(self, target: Target) -> None:
+        refused: set[Address] = set()
+        era = self._era(target)
+        loop = asyncio.get_running_loop()
+        own = 0.0
+        while True:
+            plan = self._plan()
+            if era != self._era(target):
+                era = self._era(target)
+                refused.clear()
+            mine = [one for one in self._wanted[target.slug] if one not in refused]
+            wanted = self._not_in_pdos(target, mine) if self._allowed(target, plan.load_cap) else []
+            if not wanted:
+                own = 0.0
+                await asyncio.sleep(LOOK_S)
+                continue
+            begun_s = loop.time()
+            answers = await self._read(target, wanted)
+            refused.update(address for address, answer in answers.items() if is_lasting(address, answer))
+            bits = sum(read_bits(target.description.entries[address]) for address in wanted)
+            pause_s = self._round_s(target, plan.load_cap, bits, own) - (loop.time() - begun_s)
+            await asyncio.sleep(max(LEAST_S, pause_s))
+            own = bits / self._bitrate(target) / max(LEAST_S, loop.time() - begun_s)
+
+    def _round_s(self, target: Target, cap: float, bits: int, own: float) -> float:
+        """How long a round should take so that the load stays under its cap. ``own``: the share we take now."""
+        link = self._connection.buses[target.device.bus]
+        sharing = sum(1 for one in self._targets if one.device.bus == target.device.bus)
+        others = max(0.0, link.bus_load(self._connection.stamper()) - own * sharing)
+        return bits / (self._bitrate(target) * max(LEAST_ROOM, (cap - others) / sharing))
+
+    def _bitrate(self, target: Target) -> int:
+        return self._connection.buses[target.device.bus].bitrate

@@ -1,0 +1,150 @@
+import "uplot/dist/uPlot.min.css";
+import { useComputedColorScheme } from "@mantine/core";
+import { useEffect, useRef } from "react";
+import UPlot from "uplot";
+import { localise } from "../../../model/values";
+import { useTexts } from "../../../texts/texts";
+import classes from "./Scope.module.css";
+import { axisOf, coloursOf, labels } from "./ScopePlot";
+import { useWidth } from "./ScopePlots";
+
+const LEFT_PX = 64;
+const MARGIN = 0.06;
+/** So many points at most are dots as well. */
+const DOTS = 3000;
+const DOT_PX = 2;
+
+interface Props {
+  /** Points that are joined in their order; null breaks the line. */
+  x: readonly (number | null)[];
+  y: readonly (number | null)[];
+  colour: number;
+  label: string;
+  xUnit: string;
+  yUnit: string;
+  /** The axis begins at 0, as amplitudes do. */
+  fromZero: boolean;
+  drawn: Map<string, UPlot>;
+  name: string;
+}
+
+/** One curve over any axis: a spectrum, or one signal over another. */
+export function Chart({ x, y, colour, label, xUnit, yUnit, fromZero, drawn, name }: Props) {
+  const t = useTexts();
+  const scheme = useComputedColorScheme();
+  const holder = useRef<HTMLDivElement>(null);
+  const width = useWidth(holder);
+  useEffect(() => {
+    const element = holder.current;
+    if (!element || width === 0) return;
+    const show = (text: string) => localise(text, t.language);
+    const axis = axisOf(element);
+    const paint = (made: UPlot) => paintCurve(made, x, y, coloursOf(element)[colour] ?? "", !fromZero);
+    const made = new UPlot(
+      {
+        width,
+        height: element.clientHeight,
+        legend: { show: false },
+        cursor: { show: false },
+        padding: [18, 14, 0, 0],
+        scales: {
+          x: { time: false, range: rangeOf(x, fromZero) },
+          y: { range: rangeOf(y, fromZero) },
+        },
+        axes: [
+          { ...axis, size: 24, space: 70, values: (_made, splits) => labels(splits).map(show) },
+          { ...axis, size: LEFT_PX, space: 28, values: (_made, splits) => labels(splits).map(show) },
+        ],
+        series: [{}, { show: true, auto: false }],
+        hooks: { draw: [paint] },
+      },
+      [
+        [0, 1],
+        [null, null],
+      ],
+      element,
+    );
+    drawn.set(name, made);
+    const observer = new ResizeObserver(() => made.setSize({ width, height: element.clientHeight }));
+    observer.observe(element);
+    return () => {
+      observer.disconnect();
+      drawn.delete(name);
+      made.destroy();
+    };
+  }, [x, y, colour, fromZero, width, scheme, t, drawn, name]);
+  return (
+    <figure className={classes.chart}>
+      <div
+        ref={holder}
+        className={classes.chartCanvas}
+        role="img"
+        aria-label={label}
+        data-testid={`scope-${name}`}
+      >
+        <span className={classes.unit}>{yUnit}</span>
+      </div>
+      <figcaption className={classes.axis}>{xUnit}</figcaption>
+    </figure>
+  );
+}
+
+function rangeOf(values: readonly (number | null)[], fromZero: boolean): [number, number] {
+  let [low, high] = [Infinity, -Infinity];
+  for (const one of values) {
+    if (one === null) continue;
+    if (one < low) low = one;
+    if (one > high) high = one;
+  }
+  if (low > high) return [0, 1];
+  const apart = Math.max(high - low, Math.abs(high) * 1e-3, 0.01);
+  return [fromZero ? 0 : low - apart * MARGIN, high + apart * MARGIN];
+}
+
+function paintCurve(
+  made: UPlot,
+  x: readonly (number | null)[],
+  y: readonly (number | null)[],
+  colour: string,
+  dots: boolean,
+): void {
+  const { ctx: brush, bbox } = made;
+  brush.save();
+  brush.beginPath();
+  brush.rect(bbox.left, bbox.top, bbox.width, bbox.height);
+  brush.clip();
+  brush.beginPath();
+  let open = false;
+  x.forEach((at, n) => {
+    const value = y[n] ?? null;
+    if (at === null || value === null) {
+      open = false;
+      return;
+    }
+    const [left, top] = [made.valToPos(at, "x", true), made.valToPos(value, "y", true)];
+    if (open) brush.lineTo(left, top);
+    else brush.moveTo(left, top);
+    open = true;
+  });
+  brush.strokeStyle = colour;
+  brush.lineWidth = 1.6 * devicePixelRatio;
+  brush.lineJoin = "round";
+  brush.stroke();
+  if (dots && x.length <= DOTS) {
+    brush.fillStyle = colour;
+    x.forEach((at, n) => {
+      const value = y[n] ?? null;
+      if (at === null || value === null) return;
+      brush.beginPath();
+      brush.arc(
+        made.valToPos(at, "x", true),
+        made.valToPos(value, "y", true),
+        DOT_PX * devicePixelRatio,
+        0,
+        2 * Math.PI,
+      );
+      brush.fill();
+    });
+  }
+  brush.restore();
+}

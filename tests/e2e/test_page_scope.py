@@ -1,0 +1,237 @@
+"""The oscilloscope as its user uses it: signals, trigger, arm, cursors, spectrum, XY, reference, files, a reload."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import BrowserContext, Download, Page, expect
+
+from tests.e2e.browser import SIZE
+from tests.e2e.test_page_motion import give_back, prepare, press, stands_still, take_control
+from tests.e2e.test_page_quality import AXE
+
+pytestmark = [pytest.mark.browser, pytest.mark.timeout(300)]
+AXIS = "wtg-07/blade-1/pmc"
+POSITION = f"{AXIS}/6064"
+WAIT_MS = 30_000
+PNG = b"\x89PNG\r\n\x1a\n"
+
+
+@pytest.fixture
+def scope(page: Page, demo: str) -> Iterator[Page]:
+    """The tab of the scope; the wide window is a technician's laptop."""
+    page.goto(f"{demo.split('?')[0]}axis?tab=scope&blade=1&scene=off")
+    expect(page.get_by_test_id("scope-state")).to_be_visible()
+    expect(page.get_by_test_id("preset-motion")).to_be_enabled()
+    yield page
+    if page.get_by_test_id("scope-stop").is_enabled():
+        page.get_by_test_id("scope-stop").click()
+
+
+def choose(page: Page, label: str, option: str) -> None:
+    """Pick an option of a list."""
+    page.get_by_test_id(label).click()
+    page.get_by_role("option", name=option, exact=True).click()
+
+
+def setting(page: Page, total_s: str = "1", pre_s: str = "0.4") -> None:
+    page.get_by_test_id("scope-side-trigger").click()
+    page.get_by_test_id("scope-total").fill(total_s)
+    page.get_by_test_id("scope-pre").fill(pre_s)
+
+
+def arm(page: Page) -> None:
+    page.get_by_test_id("arm").click()
+    expect(page.get_by_test_id("scope-state")).to_contain_text("Waiting for the trigger")
+    expect(page.get_by_test_id("scope-live")).to_be_visible(timeout=WAIT_MS)
+
+
+def captured(page: Page) -> str:
+    """The name of the capture that the page shows by itself."""
+    expect(page.get_by_test_id("scope-capture")).to_be_visible(timeout=WAIT_MS)
+    return page.get_by_test_id("capture-name").inner_text()
+
+
+def by_hand(page: Page) -> str:
+    """Arm, wait until values come, trigger."""
+    arm(page)
+    page.get_by_test_id("scope-side-signals").click()
+    expect(page.get_by_test_id("chosen-signals")).to_contain_text(re.compile(r"polled, about \d|by PDO"))
+    page.wait_for_timeout(600)  # so that there is something before the trigger
+    page.get_by_test_id("trigger-now").click()
+    return captured(page)
+
+
+def bytes_of(download: Download) -> bytes:
+    return Path(download.path()).read_bytes()
+
+
+def test_a_capture_from_the_signals_to_the_files(scope: Page) -> None:
+    page = scope
+    page.get_by_test_id("preset-motion").click()
+    expect(page.get_by_test_id("chosen-signals").get_by_role("listitem")).to_have_count(6)
+    page.get_by_test_id("find-signal").fill("dc link circuit voltage blade 1")
+    page.get_by_test_id(f"add-{AXIS}/6079").click()
+    expect(page.get_by_test_id(f"chosen-{AXIS}/6079")).to_be_visible()
+    page.get_by_role("button", name=re.compile("^Remove .*current actual value")).click()
+    expect(page.get_by_test_id("chosen-signals").get_by_role("listitem")).to_have_count(6)
+    setting(page)
+    first = by_hand(page)
+    expect(page.get_by_test_id("capture-facts")).to_contain_text("triggered by hand · complete")
+
+    # cursors, by button, by keyboard and by dragging
+    page.get_by_test_id("cursors").click()
+    page.get_by_test_id("cursor-a").fill("-0.1")
+    page.get_by_test_id("cursor-b").fill("0.4")
+    expect(page.get_by_test_id("delta-t")).to_contain_text("0.500000 s")
+    expect(page.get_by_test_id("one-over-delta-t")).to_contain_text("2.000 Hz")
+    row = page.get_by_test_id(f"trace-{POSITION}")
+    expect(row.get_by_test_id("at-a")).to_have_text(re.compile(r"^\d+\.\d\d °$"))
+    expect(row.get_by_test_id("delta")).to_have_text(re.compile(r"^−?\d\.\d\d °$"))
+
+    # zoom by dragging, by keyboard, and back
+    box = page.get_by_test_id("scope-plots").bounding_box()
+    assert box is not None
+    page.mouse.move(box["x"] + 0.30 * box["width"], box["y"] + 60)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 0.45 * box["width"], box["y"] + 60, steps=4)
+    page.mouse.up()
+    expect(page).to_have_url(re.compile(r"zoom=-?0"))
+    page.get_by_test_id("scope-plots").press("+")
+    narrow = page.url
+    page.get_by_test_id("scope-plots").press("0")
+    expect(page).not_to_have_url(re.compile("zoom="))
+    assert narrow != page.url
+
+    # files
+    with page.expect_download() as csv:
+        page.get_by_test_id("scope-csv").click()
+    lines = bytes_of(csv.value).decode("utf-8-sig").splitlines()
+    assert lines[0].startswith("time since trigger [s],t_ns,blade-1/pmc position actual value [°]")
+    times = [float(line.split(",")[0]) for line in lines[1:]]
+    assert times == sorted(times)
+    assert times[0] >= -0.4
+    assert times[-1] <= 0.6
+    with page.expect_download() as plain:
+        page.get_by_test_id("scope-json").click()
+    whole = json.loads(bytes_of(plain.value))
+    assert whole["format"] == "hubside-capture/1"
+    assert [one["count"] for one in whole["signals"]] == [len(one["raw"]) for one in whole["signals"]]
+    assert len(whole["in_force"]) > 100
+    with page.expect_download() as picture:
+        page.get_by_test_id("scope-png").click()
+    data = bytes_of(picture.value)
+    assert data.startswith(PNG)
+    assert int.from_bytes(data[16:20], "big") > 600, "as wide as the plots"
+
+    # parameters in force
+    page.get_by_test_id("in-force").click()
+    expect(page.get_by_test_id("table-in-force").get_by_role("row").nth(1)).to_be_visible()
+
+    # a name, a reload, and a second capture over which the first one lies
+    page.get_by_test_id("edit-capture").click()
+    page.get_by_test_id("capture-name-field").fill("first one")
+    page.get_by_test_id("save-capture").click()
+    expect(page.get_by_test_id("capture-name")).to_have_text("first one")
+    page.reload()
+    expect(page.get_by_test_id("capture-name")).to_have_text("first one")
+    expect(page.get_by_test_id("delta-t")).to_contain_text("0.500000 s")
+    assert first != "first one"
+    setting(page)
+    second = by_hand(page)
+    assert second != "first one"
+    page.get_by_test_id("scope-side-captures").click()
+    page.get_by_label("Lay capture first one over as a reference").check()
+    expect(page.get_by_test_id(f"reference-{POSITION}")).to_contain_text("dashed: first one")
+
+
+def test_a_moving_axis_triggers_and_its_capture_shows_the_motion(
+    context: BrowserContext, demo: str, scope: Page
+) -> None:
+    """Moved from another page, as a colleague does; spectrum and XY of what came."""
+    mover = context.new_page()
+    mover.goto(f"{demo.split('?')[0]}axis?blade=1&scene=off")
+    expect(mover.get_by_test_id("axis-angle")).to_have_text(re.compile(r"\d"))
+    take_control(mover)
+    prepare(mover)
+    start = stands_still(mover)
+    page = scope
+    page.get_by_test_id("preset-motion").click()
+    setting(page, "3", "1")
+    choose(page, "trigger-kind", "Edge")
+    choose(page, "trigger-signal", "Blade 1 PMC position actual value")
+    page.get_by_test_id("scope-level").fill(f"{start - 0.5:.2f}")
+    page.get_by_text("falling", exact=True).click()
+    arm(page)
+    press(mover, "jog-minus")
+    captured(page)
+    mover.mouse.up()
+    expect(page.get_by_test_id("capture-facts")).to_contain_text("by its trigger")
+    page.get_by_test_id("cursors").click()
+    page.get_by_test_id("cursor-a").fill("-0.9")
+    page.get_by_test_id("cursor-b").fill("0.9")
+    delta = page.get_by_test_id(f"trace-{POSITION}").get_by_test_id("delta")
+    expect(delta).to_have_text(re.compile(r"^−\d+\.\d\d °$"))
+
+    page.get_by_test_id("scope-view").get_by_text("FFT").click()
+    expect(page.get_by_test_id("fft-told")).to_contain_text("by holding the last value")
+    expect(page.get_by_test_id("scope-fft")).to_be_visible()
+    expect(page.get_by_test_id("peaks")).to_be_visible()
+    page.get_by_test_id("scope-view").get_by_text("XY").click()
+    expect(page.get_by_test_id("xy-told")).to_contain_text("instants")
+    expect(page.get_by_test_id("scope-xy")).to_be_visible()
+
+    give_back(mover)
+    mover.close()
+
+
+def test_what_does_not_fit_is_told_and_nothing_is_armed(scope: Page) -> None:
+    page = scope
+    page.get_by_test_id("preset-supply").click()
+    setting(page, "0.01", "0")
+    page.get_by_test_id("arm").click()
+    expect(page.get_by_text("The scope was not armed")).to_be_visible()
+    expect(page.get_by_text("must lie between 0.1 and 120")).to_be_visible()
+    page.get_by_test_id("scope-total").fill("1")
+    choose(page, "trigger-kind", "Fault")
+    page.get_by_test_id("trigger-code").fill("xyz")
+    expect(page.get_by_text("One to four hexadecimal digits")).to_be_visible()
+    expect(page.get_by_test_id("arm")).to_be_disabled()
+
+
+def test_in_a_replay_the_scope_is_locked(page: Page, demo: str) -> None:
+    page.goto(f"{demo.split('?')[0]}axis?tab=scope&scene=off&replay=3-following-error")
+    expect(page.get_by_test_id("scope-lock")).to_be_visible()
+    expect(page.get_by_test_id("arm")).to_have_count(0)
+    page.get_by_test_id("scope-side-captures").click()
+    page.get_by_test_id("open-capture").first.click()
+    expect(page.get_by_test_id("scope-capture")).to_be_visible()
+
+
+@pytest.mark.parametrize("theme", ["dark", "light"])
+@pytest.mark.parametrize("language", ["en", "de"])
+def test_axe_finds_nothing_serious_and_nothing_is_cut(page: Page, demo: str, theme: str, language: str) -> None:
+    page.set_viewport_size(SIZE)
+    page.goto(f"{demo.split('?')[0]}axis?tab=scope&blade=1&scene=off&theme={theme}&lang={language}")
+    page.get_by_test_id("scope-side-captures").click()
+    page.get_by_test_id("open-capture").first.click()
+    expect(page.get_by_test_id("scope-capture")).to_be_visible()
+    page.get_by_test_id("cursors").click()
+    page.get_by_test_id("in-force").click()
+    for side in ("signals", "trigger", "captures"):
+        page.get_by_test_id(f"scope-side-{side}").click()
+        page.add_script_tag(path=AXE)
+        result = page.evaluate("() => axe.run(document, {resultTypes: ['violations']})")
+        assert result["passes"], "axe has looked at something"
+        found = [
+            f"{one['impact']} {one['id']}: {node['html'][:160]}"
+            for one in result["violations"]
+            if one["impact"] in ("serious", "critical")
+            for node in one["nodes"]
+        ]
+        assert found == []
+    assert page.evaluate("() => document.documentElement.scrollWidth") <= SIZE["width"]
