@@ -55,7 +55,7 @@ export function TriggerPanel({ draft, options, chosen, locked, onChange }: Props
         label={t("page.scope.mode")}
         value={draft.mode}
         names={["single", "normal", "auto"]}
-        text="page.scope.mode_"
+        textOf={(name) => t(`page.scope.mode_${name}`)}
         take={(mode) => onChange({ mode })}
       />
       <p className={classes.told}>{t(`page.scope.mode_${draft.mode}_explain`)}</p>
@@ -104,7 +104,7 @@ function OfKind({ draft, options, chosen, locked, onChange }: Props) {
             label={t("page.scope.slope")}
             value={draft.slope}
             names={["rising", "falling", "either"]}
-            text="page.scope.slope_"
+            textOf={(name) => t(`page.scope.slope_${name}`)}
             take={(slope) => onChange({ slope })}
           />
         ) : (
@@ -112,7 +112,7 @@ function OfKind({ draft, options, chosen, locked, onChange }: Props) {
             label={t("page.scope.side_of")}
             value={draft.side}
             names={["above", "below"]}
-            text="page.scope.side_"
+            textOf={(name) => t(`page.scope.side_${name}`)}
             take={(side) => onChange({ side })}
           />
         )}
@@ -208,12 +208,11 @@ interface ChoiceProps<Name extends string> {
   label: string;
   value: Name;
   names: readonly Name[];
-  text: string;
+  textOf: (name: Name) => string;
   take: (name: Name) => void;
 }
 
-function Choice<Name extends string>({ label, value, names, text, take }: ChoiceProps<Name>) {
-  const t = useTexts();
+function Choice<Name extends string>({ label, value, names, textOf, take }: ChoiceProps<Name>) {
   return (
     <div>
       <span className={classes.label}>{label}</span>
@@ -222,7 +221,7 @@ function Choice<Name extends string>({ label, value, names, text, take }: Choice
         aria-label={label}
         value={value}
         onChange={(name) => take(name)}
-        data={names.map((name) => ({ value: name, label: t(`${text}${name}`) }))}
+        data={names.map((name) => ({ value: name, label: textOf(name) }))}
       />
     </div>
   );
