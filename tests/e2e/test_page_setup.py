@@ -213,7 +213,7 @@ def test_unknown_values_are_a_dash_until_they_are_read(page: Page, demo: str) ->
 
 
 def test_an_axis_is_set_up_and_canopen_reads_it_back(page: Page, bench: tuple[str, int]) -> None:
-    """Last: another SDO client on the bus makes the bench hold back."""
+    """Last: the bench ends its connection, for there is one SDO channel to a node."""
     demo, port = bench
     picture(page, demo, "temperatures")
     drag(page, "3110:01", -2, SCALE_C)
@@ -268,6 +268,8 @@ def test_an_axis_is_set_up_and_canopen_reads_it_back(page: Page, bench: tuple[st
     pending(page, 0)
     expect(mark(page, "30FB:07")).to_have_attribute("aria-valuetext", "690 V")
 
+    ended = page.request.post(f"{demo.split('?')[0]}api/live/disconnect", data={})
+    assert ended.ok, ended.text()
     network = canopen.Network()
     network.connect(interface="socketcand", host="127.0.0.1", port=port, channel="can0")
     try:

@@ -31,6 +31,7 @@ from app.service.motion.borrowed import TARGET, Borrowed, PdoFound
 from app.service.motion.control import AxisMode, Control, Word
 from app.service.motion.courses import CURRENT, FOLLOWING, POSITION, VELOCITY, Courses
 from app.service.motion.desk import Doing, Ended, MotionDesk, Running
+from app.service.motion.moves import LEFT_ALONE
 from app.service.motion.signals import MOST_DPS, DriveLimits, Shape, Signal, check
 from app.service.stop import STATUSWORD
 from app.service.write import know_what_it_rests_on, write_raw
@@ -55,7 +56,6 @@ IN_FORCE: Final = tuple(
 _LOOK_S: Final = 0.04
 _SAMPLE_S: Final = 0.01
 _FOLLOWING_OFF: Final = 0xFFFFFFFF
-_ENDED_BY_QUICK_STOP: Final = (Ended.SILENT, Ended.LEASE, Ended.LINK, Ended.STOPPED)
 
 
 class Transport(Enum):
@@ -302,7 +302,7 @@ class _Run:
 
         Where a quick stop is under way, or somebody else has commanded the axis, it is left to that.
         """
-        if self._running.why in _ENDED_BY_QUICK_STOP:
+        if self._running.why in LEFT_ALONE:
             return
         with suppress(OvertakenError):
             self._control.word(Word.HALT if self._running.turning else Word.SHUTDOWN)
