@@ -45,6 +45,7 @@ class Word(IntEnum):
     FEATHER = 0x080F
 
 
+_ENABLE_OPERATION: Final = 1 << 3
 _OFF: Final = frozenset({AxisState.SWITCH_ON_DISABLED, AxisState.READY})
 TARGET_REACHED: Final = 1 << 10
 ACKNOWLEDGED: Final = 1 << 12
@@ -216,7 +217,8 @@ class Control:
         if await self.number(MODE_SHOWN) == mode:
             return
         await self.switch_off()
-        self.word(Word.SHUTDOWN)  # bit 3 of the word that stands must be 0 too
+        self.word(Word.SHUTDOWN)
+        await self._until_heard()
         self.require_own()
         await self.driver.write(self.target.node, MODE, mode.to_bytes(1, "little"), verify=Verify.ACK)
         found = await self.number(MODE_SHOWN)
@@ -224,6 +226,14 @@ class Control:
             raise UnverifiedError(
                 address=MODE.short, name="mode", sent=str(int(mode)), found=str(found), reason="the mode did not change"
             )
+
+    async def _until_heard(self) -> None:
+        """Wait until bit 3 of the word that stands in the device is 0 too: a PDO may be worked later than a request."""
+        end_s = asyncio.get_running_loop().time() + STATE_TIMEOUT_S
+        while await self.number(CONTROLWORD) & _ENABLE_OPERATION:
+            if asyncio.get_running_loop().time() >= end_s:
+                raise AxisStateError(device=self.target.slug, state="enabled by 6040h", wanted="6040h bit 3 = 0")
+            await asyncio.sleep(_LOOK_S)
 
     async def enable(self) -> None:
         """Operation enabled, halted: the axis holds where it is. Raises AxisStateError, OvertakenError."""

@@ -173,10 +173,13 @@ async def test_stop_before_the_button_is_heard_of_wins(connection: Connection) -
         start_deg = await angle_deg(connection)
         motion = asyncio.create_task(jog(desk, AXIS, page.fence, -4.0, connection.journal))
         await asyncio.sleep(0.05)  # the order is there, its beat is late
-        await command_all(connection.axes(), Command.STOP, connection.journal, connection.stamper)
+        stop = command_all(connection.axes(), Command.STOP, connection.journal, connection.stamper)
+        stopping = asyncio.create_task(stop)
+        await asyncio.sleep(0.02)  # it is on the wire; that the axes obey is told later
         page.hold()
         with pytest.raises(OvertakenError):
             await motion
+        await stopping
         assert await angle_deg(connection) == pytest.approx(start_deg, abs=0.05)
 
 
