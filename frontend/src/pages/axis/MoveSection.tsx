@@ -69,7 +69,7 @@ export function MoveSection({ device, context }: { device: string; context: Devi
           data-testid="angle"
         />
       </div>
-      <div className={motion.row}>
+      <div className={`${motion.row} ${motion.runs}`}>
         <RunButton
           hint={t("page.motion.to_zero")}
           disabled={!ready || busy}

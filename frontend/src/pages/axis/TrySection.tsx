@@ -35,7 +35,7 @@ export function TrySection({ device, context }: { device: string; context: Devic
   return (
     <section aria-label={t("page.motion.try")}>
       <h3>{t("page.motion.try")}</h3>
-      <div className={motion.row}>
+      <div className={`${motion.row} ${motion.runs}`}>
         <RunButton
           hint={t("page.motion.hold_hint")}
           disabled={disabled}
