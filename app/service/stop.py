@@ -16,7 +16,7 @@ from enum import Enum
 from typing import Final
 
 from app.drivers.contract import Driver
-from app.errors import HubsideError, OvertakenError
+from app.errors import BusLostError, HubsideError, OvertakenError
 from app.model.address import Address
 from app.model.axis_state import AxisState
 from app.model.description import Verify
@@ -85,7 +85,7 @@ async def _command(axis: Axis, command: Command, now_ns: Callable[[], int]) -> A
     data = command.value.to_bytes(2, "little")
     sent_t_ns = now_ns()
     try:
-        if axis.by_rpdo(data):
+        if _by_rpdo(axis, data):
             how = Path.RPDO
         else:
             await driver.write(target.node, CONTROLWORD, data, verify=Verify.ACK, urgent=True)
@@ -96,6 +96,14 @@ async def _command(axis: Axis, command: Command, now_ns: Callable[[], int]) -> A
     except HubsideError as error:
         return AxisOutcome(target.slug, Path.FAILED, sent_t_ns, None, error)
     return AxisOutcome(target.slug, how, sent_t_ns, now_ns() if confirmed else None)
+
+
+def _by_rpdo(axis: Axis, data: bytes) -> bool:
+    """Whether a PDO took it; where the adapter did not take the frame, the SDO channel is tried as well."""
+    try:
+        return axis.by_rpdo(data)
+    except BusLostError:
+        return False
 
 
 async def _confirmed(driver: Driver, target: Target, command: Command) -> bool:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Collection
 from enum import IntEnum
 from typing import Any, Final
 
-from app.errors import AxisStateError, OvertakenError, UnverifiedError
+from app.errors import AxisStateError, NotHeldError, OvertakenError, UnverifiedError
 from app.model.address import Address
 from app.model.axis_state import ENERGISED, AxisState
 from app.model.description import Verify
@@ -23,6 +23,10 @@ MODE: Final = Address(0x6060)
 MODE_SHOWN: Final = Address(0x6061)
 VELOCITY: Final = Address(0x606C)
 MANUAL: Final = Address(0x5040)
+POSITION: Final = Address(0x6064)
+EFC_TARGET: Final = Address(0x567A)
+_EFC: Final = 1 << 11
+_AT_TARGET_DEG: Final = 0.5
 _LOOK_S: Final = 0.01
 STATE_TIMEOUT_S: Final = 3.0
 STAND_TIMEOUT_S: Final = 10.0
@@ -73,12 +77,12 @@ class Control:
         self.target = target
         self._send = send
         self._known = 0
-        self._sent = self._ended = False
+        self._sent = self._ended = self._released = False
 
     def own(self) -> None:
         """Command the axis from now on: another order begins."""
         self._known = self._count()
-        self._sent = self._ended = False
+        self._sent = self._ended = self._released = False
 
     def _count(self) -> int:
         return int(self.driver.commanded(self.target.node, CONTROLWORD))
@@ -97,9 +101,7 @@ class Control:
         """Send a controlword. Raises OvertakenError, AxisStateError (not operational), BusLostError."""
         self.require_own()
         self._sent = True
-        sent = self._send(word.to_bytes(2, "little"))
-        self._known = self._count()
-        if not sent:
+        if not self._send_counted(word):
             raise AxisStateError(device=self.target.slug, state="not operational", wanted="operational")
 
     async def halt(self) -> None:
@@ -118,9 +120,22 @@ class Control:
         self._ended = True
         if self.overtaken or not self._sent:
             return True
-        sent = self._send(Word.QUICK_STOP.to_bytes(2, "little"))
-        self._known = self._count()
-        return sent
+        return self._send_counted(Word.QUICK_STOP)
+
+    def _send_counted(self, word: Word) -> bool:
+        """A frame that the adapter did not take is counted too: it is ours, not a command of somebody else."""
+        try:
+            return self._send(word.to_bytes(2, "little"))
+        finally:
+            self._known = self._count()
+
+    def release(self) -> None:
+        """Nobody holds it any more: ``enable`` goes no step further."""
+        self._released = True
+
+    def _require_held(self) -> None:
+        if self._released:
+            raise NotHeldError(device=self.target.slug)
 
     async def stop_by_sdo(self) -> None:
         """Quick stop where no PDO carries it: ahead of all that waits. Raises NoAnswerError, DeviceError."""
@@ -172,6 +187,19 @@ class Control:
                 raise AxisStateError(device=self.target.slug, state=f"{status:04X}h", wanted=wanted)
             await asyncio.sleep(_LOOK_S)
         return status
+
+    async def is_feathering(self) -> bool:
+        """An EFC is commanded, and the axis has power and is not there yet."""
+        if EFC_TARGET not in self.target.description.entries:
+            return False
+        if not await self.number(CONTROLWORD) & _EFC or await self.state() not in ENERGISED:
+            return False
+        far = abs(await self._degrees(POSITION) - await self._degrees(EFC_TARGET)) > _AT_TARGET_DEG
+        return far or not await self.until_still(timeout_s=0.0)
+
+    async def _degrees(self, address: Address) -> float:
+        found = to_scaled(self.target.entry(address), await self.number(address), self.target.lookup)
+        return 0.0 if found is None else float(found.number)
 
     async def until_still(self, timeout_s: float = STAND_TIMEOUT_S) -> bool:
         """Wait until the axis stands; whether it does."""
@@ -236,7 +264,10 @@ class Control:
             await asyncio.sleep(_LOOK_S)
 
     async def enable(self) -> None:
-        """Operation enabled, halted: the axis holds where it is. Raises AxisStateError, OvertakenError."""
+        """Operation enabled, halted: the axis holds where it is.
+
+        Raises AxisStateError, OvertakenError, NotHeldError.
+        """
         state = await self.state()
         if state in (AxisState.FAULT, AxisState.FAULT_REACTION_ACTIVE):
             raise AxisStateError(device=self.target.slug, state=state.name.lower(), wanted="operation_enabled")
@@ -245,8 +276,10 @@ class Control:
             return
         self.word(Word.SHUTDOWN)
         await self.until({AxisState.READY})
+        self._require_held()
         self.word(Word.SWITCH_ON)
         await self.until({AxisState.SWITCHED_ON})
+        self._require_held()
         self.word(Word.HALT)
         await self.until({AxisState.OPERATION_ENABLED})
 
@@ -257,7 +290,11 @@ class Control:
         listening to its controlword, or where it hears no PDO. Raises OvertakenError, AxisStateError, and what a write
         raises.
         """
-        if not await self.status() & REMOTE or not self._reset_by_word():
+        status = await self.status()
+        state = AxisState.of(status)
+        if status & REMOTE and state is not None and state is not AxisState.FAULT:
+            return state  # there is none: its words would end what is under way
+        if not status & REMOTE or not self._reset_by_word():
             self.require_own()
             for data in (b"\x80", b"\0"):
                 await self.driver.write(self.target.node, MANUAL, data, verify=Verify.ACK)

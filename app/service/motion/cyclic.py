@@ -31,9 +31,9 @@ from app.service.motion.borrowed import TARGET, Borrowed, PdoFound
 from app.service.motion.control import AxisMode, Control, Word
 from app.service.motion.courses import CURRENT, FOLLOWING, POSITION, VELOCITY, Courses
 from app.service.motion.desk import Doing, Ended, MotionDesk, Running
-from app.service.motion.moves import LEFT_ALONE
+from app.service.motion.moves import STOPPING, come_to_rest
 from app.service.motion.signals import MOST_DPS, DriveLimits, Shape, Signal, check
-from app.service.stop import STATUSWORD
+from app.service.stop import CONTROLWORD, STATUSWORD
 from app.service.write import know_what_it_rests_on, write_raw
 from app.wire import pdo
 from app.wire.frame import Can
@@ -91,7 +91,11 @@ async def play(desk: MotionDesk, slug: str, fence: int, signal: Signal, journal:
     """
     desk.lease.check(fence)
     target = desk.connection.target(slug)
-    played = await look(desk.connection.driver(target), target, signal)
+    driver = desk.connection.driver(target)
+    before = driver.commanded(target.node, CONTROLWORD)
+    played = await look(driver, target, signal)
+    if driver.commanded(target.node, CONTROLWORD) != before:  # a STOP that was pressed meanwhile
+        raise OvertakenError(address=CONTROLWORD.short, node=target.node)
 
     async def work(running: Running) -> None:
         run = _Run(desk, running, played, journal)
@@ -302,10 +306,8 @@ class _Run:
 
         Where a quick stop is under way, or somebody else has commanded the axis, it is left to that.
         """
-        if self._running.why in LEFT_ALONE:
+        if self._running.why in STOPPING:
             return
         with suppress(OvertakenError):
-            self._control.word(Word.HALT if self._running.turning else Word.SHUTDOWN)
-            await self._control.until_still()
-            await self._control.switch_off()
+            await come_to_rest(self._running)
             await self._control.set_mode(AxisMode.PROFILE_POSITION)

@@ -240,6 +240,7 @@ class MotionDesk:
     def _halt_running(self, running: Running) -> None:
         """Let go: the axis halts by its ramp. One that does not run yet would be enabled by that word."""
         if not running.turning:
+            running.control.release()
             running.end(Ended.RELEASED)
             return
         try:
@@ -257,9 +258,10 @@ class MotionDesk:
         self.dead_man.release()
         try:
             by_pdo = running.control.stop()
-        except HubsideError as error:  # the link is lost: the drive stops by itself
+        except HubsideError as error:  # the link is lost, or the adapter is full: without us the drive stops by itself
             log.warning("%s: quick stop was not sent: %s", running.slug, error.code)
-            return
+            self._heartbeats[running.control.target.device.bus].withhold(running.slug)
+            by_pdo = False
         if not by_pdo:
             self._chore(running.control.stop_by_sdo())
         self._chore(self._see_off(running.control))
@@ -272,9 +274,13 @@ class MotionDesk:
         try:
             await asyncio.sleep(OBEY_S)
             if control.overtaken or await control.state() is not AxisState.OPERATION_ENABLED:
+                heartbeat.go_on(slug)
                 return
         except HubsideError as error:
             log.warning("%s: whether it stops is not known: %s", slug, error.code)
+        if control.overtaken:  # meanwhile: a FEATHER must not end by our silence
+            heartbeat.go_on(slug)
+            return
         heartbeat.withhold(slug)
         await control.stop_by_sdo()
         if await control.until_off(preparation.OFF_TIMEOUT_S):
@@ -448,6 +454,8 @@ class MotionDesk:
                 await self._put_back(axis, self._journal)
             except HubsideError as error:
                 log.warning("%s: what was prepared is not put back: %s", axis.slug, error.code)
+                # Nobody looks after it any more: where it has power, it shall stop.
+                self._heartbeats[axis.control.target.device.bus].withhold(axis.slug)
 
     @contextmanager
     def kept_still(self, slug: str, page: str) -> Iterator[None]:
@@ -480,12 +488,20 @@ class MotionDesk:
         """
         self.lease.check(fence)
         running = self.running
-        if running is not None and running.slug == slug and running.held:
-            self._halt_running(running)
+        if running is not None and running.slug == slug:
+            if running.held and not running.over.is_set():
+                self._halt_running(running)
             return
         control = self._control(self._axis(slug))
         control.own()
+        await self._require_no_feather(control)
         await control.halt()
+
+    async def _require_no_feather(self, control: Control) -> None:
+        """Raises InterlockError where an EFC is under way: whatever is commanded now would end it."""
+        if await control.is_feathering():
+            reason = "an emergency feather drive is under way; STOP ends it"
+            raise InterlockError(device=control.target.slug, interlock="feathering", reason=reason)
 
     async def without_proof(
         self, slug: str, fence: int, doing: Doing, work: Callable[[Running], Awaitable[None]]
@@ -537,6 +553,7 @@ class MotionDesk:
         error: HubsideError | None = None
         try:
             await self.require_clear(slug)
+            await self._require_no_feather(control)
             self.lease.check(fence)
             if running.over.is_set():
                 raise NotHeldError(device=slug)
@@ -551,6 +568,8 @@ class MotionDesk:
             running.end(Ended.FAILED)
             raise
         finally:
+            if running.task is not None and not running.task.done():
+                running.task.cancel()  # whoever waited for it is gone
             self.running = None
             self.dead_man.release()
             why = running.why or Ended.FAILED

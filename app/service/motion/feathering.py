@@ -11,14 +11,12 @@ from dataclasses import dataclass
 from typing import Final
 
 from app.errors import AxisStateError
-from app.model.address import Address
 from app.model.axis_state import ENERGISED, AxisState
-from app.service.motion.control import Word
+from app.service.motion.control import EFC_TARGET, Word
 from app.service.motion.desk import Doing, Ended, MotionDesk, Running
 from app.service.motion.interlocks import POSITION
-from app.service.motion.moves import LEFT_ALONE, degrees, wait
+from app.service.motion.moves import come_to_rest, degrees, wait
 
-TARGET: Final = Address(0x567A)
 BEGIN_TIMEOUT_S: Final = 2.0
 _REACHED_DEG: Final = 0.5
 _FAILED: Final = (AxisState.FAULT, AxisState.FAULT_REACTION_ACTIVE)
@@ -55,7 +53,7 @@ async def feather(desk: MotionDesk, slug: str, fence: int) -> Feathered:
 async def _drive(running: Running) -> Feathered:
     control, loop = running.control, asyncio.get_running_loop()
     running.let_go = Word.QUICK_STOP
-    target_deg, from_deg = await degrees(control, TARGET), await degrees(control, POSITION)
+    target_deg, from_deg = await degrees(control, EFC_TARGET), await degrees(control, POSITION)
     began_s = loop.time()
     if abs(from_deg - target_deg) <= _REACHED_DEG:
         return Feathered(from_deg, from_deg, target_deg, 0.0)
@@ -67,9 +65,7 @@ async def _drive(running: Running) -> Feathered:
         await _until_there(running, target_deg)
         took_s = loop.time() - began_s
     finally:
-        if running.why not in LEFT_ALONE:
-            await control.until_still()
-            await control.switch_off()
+        await come_to_rest(running, halt=False)
     to_deg = await degrees(control, POSITION)
     if running.why is Ended.DONE and abs(to_deg - target_deg) > _REACHED_DEG:
         raise AxisStateError(device=running.slug, state=f"{to_deg:.2f}°", wanted=f"{target_deg:.2f}°")

@@ -38,6 +38,7 @@ class Heartbeat:
         """``device`` watches us from now on: the first heartbeat goes at once."""
         self._cut = self._cut and bool(self._watching - {device})
         self._watching.add(device)
+        self._withheld.discard(device)
         if not self._cut:
             self._send()
 

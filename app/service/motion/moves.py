@@ -31,8 +31,8 @@ LOWEST: Final = Address(0x607D, 1)
 HIGHEST: Final = Address(0x607D, 2)
 MOST_DPS: Final = 5.0
 """The fastest that a person moves a blade by hand."""
-LEFT_ALONE: Final = (Ended.SILENT, Ended.LEASE, Ended.LINK, Ended.STOPPED)
-"""A quick stop is under way, or somebody else has commanded the axis."""
+STOPPING: Final = (Ended.SILENT, Ended.LEASE, Ended.LINK)
+"""A quick stop is under way."""
 _LOOK_S: Final = 0.02
 _HOME_TOLERANCE_DEG: Final = 0.1
 _MARGIN_S: Final = 0.25
@@ -200,16 +200,23 @@ async def wait(running: Running) -> None:
         return
 
 
-async def come_to_rest(running: Running) -> None:
+async def come_to_rest(running: Running, halt: bool = True) -> None:
     """Halt, wait until the blade stands, then no power and the brake engaged.
 
-    Where a quick stop is under way, or somebody else has commanded the axis, it is left to that.
+    Where a quick stop is under way, or somebody else has commanded the axis, it is left to that. Halt is only for an
+    axis that was told to run: its word enables any other. One that has left its operation by itself is not to find the
+    word that stands when it could run again. Without ``halt`` the axis stops by what was sent already.
     """
     control = running.control
-    if running.why in LEFT_ALONE:
+    if running.why in STOPPING or control.overtaken:
         return
-    control.word(Word.HALT)
+    if running.why is Ended.STOPPED:
+        if await control.state() is AxisState.SWITCHED_ON:
+            control.word(Word.SHUTDOWN)
+    elif halt:
+        control.word(Word.HALT if running.turning else Word.SHUTDOWN)
     await control.until_still()
+    running.turning = False
     await control.switch_off()
 
 

@@ -8,7 +8,11 @@ const POLL_MS = 250;
 
 export const queryClient = new QueryClient({
   defaultOptions: {
+    // The bench is on this computer or beside it: what the browser thinks of the internet must not hold a STOP back, nor
+    // send an order when nobody presses it any more.
+    mutations: { networkMode: "always" },
     queries: {
+      networkMode: "always",
       // A refusal stays a refusal; only silence is worth another try.
       retry: (failures, error) => !(error instanceof Problem) && failures < 3,
       refetchOnWindowFocus: false,

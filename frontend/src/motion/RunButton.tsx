@@ -53,7 +53,9 @@ export function RunButton({ children, hint, disabled, active, onPress, testId }:
       }}
       onPointerMove={(event: PointerEvent) => {
         const { x, y } = pressedAt.current;
-        if (Math.hypot(event.clientX - x, event.clientY - y) > SLIP_PX) letGo();
+        // With another button down the release of this one is told as a move.
+        const released = (event.buttons & 1) === 0;
+        if (released || Math.hypot(event.clientX - x, event.clientY - y) > SLIP_PX) letGo();
       }}
       onPointerUp={letGo}
       onPointerCancel={letGo}

@@ -11,11 +11,16 @@ interface Given {
   work: (order: Order) => Promise<unknown>;
 }
 
+interface Pressed {
+  /** Null: it cannot be held. */
+  order: Order | null;
+  work: (order: Order) => Promise<unknown>;
+}
+
 export function useOrder() {
-  return useMutation({
-    mutationFn: async ({ held, work }: Given) => {
-      const order = holding.next();
-      if (order === null || (held && !holding.press(order.order))) throw new NotHolding();
+  const mutation = useMutation({
+    mutationFn: async ({ order, work }: Pressed) => {
+      if (order === null) throw new NotHolding();
       try {
         return await work(order);
       } finally {
@@ -24,4 +29,11 @@ export function useOrder() {
       }
     },
   });
+  // Pressed now, while the finger is there, never when the request gets its turn.
+  const mutate = ({ held, work }: Given) => {
+    const next = holding.next();
+    const order = next === null || (held && !holding.press(next.order)) ? null : next;
+    mutation.mutate({ order, work });
+  };
+  return { ...mutation, mutate };
 }

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 
 import pytest
 
-from app.errors import AxisStateError, LeaseError
+from app.errors import AxisStateError, BusLostError, HubsideError, InterlockError, LeaseError
 from app.model.address import Address
 from app.model.axis_state import AxisState
 from app.service.connection import Connection
 from app.service.motion.brake_test import OUTPUTS, BrakeVerdict, try_brake
 from app.service.motion.desk import Ended, MotionDesk
 from app.service.motion.feathering import feather
-from app.service.motion.moves import hold, home, move_to, reset_fault
+from app.service.motion.moves import hold, home, jog, move_to, reset_fault
 from app.service.stop import Command, command_all
 from app.twins.plant import BrakeFault
 from tests.service.conftest import Served
@@ -145,6 +146,62 @@ async def test_a_brake_test_that_is_let_go_has_no_verdict(connection: Connection
         found = await trying
         assert found.verdict is None
         assert await state(connection) in OFF
+
+
+async def test_a_brake_test_that_is_let_go_while_the_blade_rests_enables_nothing(connection: Connection) -> None:
+    async with at_the_desk(connection) as (desk, page):
+        await prepared(desk, page)
+        trying = asyncio.create_task(try_brake(desk, AXIS, page.fence, connection.journal))
+        await until_state(connection, 0x27)
+        await until_state(connection, *OFF)
+        page.let_go()
+        found = await trying
+        assert found.verdict is None
+        assert why(desk) is Ended.RELEASED
+        for _ in range(10):
+            assert await state(connection) in OFF
+
+
+async def test_nothing_but_stop_ends_a_feather(connection: Connection) -> None:
+    async with at_the_desk(connection) as (desk, page):
+        await prepared(desk, page)
+        await out_of_feather(connection, desk, page)
+        await command_all(connection.axes(), Command.FEATHER, connection.journal, connection.stamper)
+        await until_state(connection, 0x27)
+        with pytest.raises(InterlockError):
+            await desk.halt(AXIS, page.fence)
+        with pytest.raises(InterlockError):
+            await hold(desk, AXIS, page.fence)
+        with pytest.raises(InterlockError):
+            await reset_fault(desk, AXIS, page.fence, connection.journal)
+        await until_angle(connection, 89.5)
+
+
+async def test_a_frame_that_the_adapter_does_not_take_keeps_nothing_from_stopping(connection: Connection) -> None:
+    async with at_the_desk(connection) as (desk, page):
+        await prepared(desk, page)
+        await out_of_feather(connection, desk, page)
+        control = desk.prepared[AXIS].control
+        send = control._send
+        moving = asyncio.create_task(jog(desk, AXIS, page.fence, -4.0, connection.journal))
+        start_deg = await angle_deg(connection)
+        async with asyncio.timeout(10.0):
+            while await angle_deg(connection) > start_deg - 0.5:  # noqa: ASYNC110  the device has no event for it
+                await asyncio.sleep(0.01)
+
+        def full(data: bytes) -> bool:
+            send(data)  # counted, as the driver does it, and not taken
+            raise BusLostError(bus="can0", reason="the adapter's buffer is full")
+
+        driver = connection.driver(connection.target(AXIS))
+        sends = driver._port.send
+        driver._port.send = lambda _can: None  # what is sent now does not reach the bus
+        control._send = full
+        page.let_go()
+        driver._port.send = sends
+        with contextlib.suppress(HubsideError):
+            await moving
+        await until_state(connection, *OFF)
 
 
 async def test_a_fault_is_reset_before_anything_is_prepared(connection: Connection, served: Served) -> None:
