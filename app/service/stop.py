@@ -3,8 +3,8 @@
 Where the node is operational and an RPDO carries the controlword alone, one frame does it. Otherwise our running
 transfer to that node is aborted and 6040h is written by SDO, ahead of everything that waits. A write of 6040h that was
 asked for before and has not left yet does not leave any more; after one that has left the command goes by SDO too, for
-a device works these in their order. No lock, lease, consent or error of another axis holds them back. This is not a
-safety function.
+a device works these in their order; and so it does where the axis does not obey a frame within 30 ms. No lock, lease,
+consent or error of another axis holds them back. This is not a safety function.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from app.service.journal import Journal, Kind
 
 CONTROLWORD: Final = Address(0x6040)
 STATUSWORD: Final = Address(0x6041)
+_OBEY_S: Final = 0.03
 
 
 class Command(Enum):
@@ -87,15 +88,33 @@ async def _command(axis: Axis, command: Command, now_ns: Callable[[], int]) -> A
     try:
         if _by_rpdo(axis, data):
             how = Path.RPDO
+            mark = driver.commanded(target.node, CONTROLWORD)
         else:
             await driver.write(target.node, CONTROLWORD, data, verify=Verify.ACK, urgent=True)
             how = Path.SDO
         confirmed = await _confirmed(driver, target, command)
+        if how is Path.RPDO and not confirmed:
+            confirmed = await _by_sdo_too(driver, target, command, data, mark)
     except OvertakenError:
         return AxisOutcome(target.slug, Path.REPLACED, sent_t_ns, None)
     except HubsideError as error:
         return AxisOutcome(target.slug, Path.FAILED, sent_t_ns, None, error)
     return AxisOutcome(target.slug, how, sent_t_ns, now_ns() if confirmed else None)
+
+
+async def _by_sdo_too(driver: Driver, target: Target, command: Command, data: bytes, mark: int) -> bool:
+    """The axis does not obey, or not yet: a PDO may be switched off in the device, or wait for a SYNC that never comes.
+
+    Raises OvertakenError where a newer command came meanwhile: this one must not come after it.
+    """
+    await asyncio.sleep(_OBEY_S)
+    confirmed = await _confirmed(driver, target, command)
+    if driver.commanded(target.node, CONTROLWORD) != mark:
+        raise OvertakenError(address=CONTROLWORD.short, node=target.node)
+    if confirmed:
+        return True
+    await driver.write(target.node, CONTROLWORD, data, verify=Verify.ACK, urgent=True)
+    return await _confirmed(driver, target, command)
 
 
 def _by_rpdo(axis: Axis, data: bytes) -> bool:

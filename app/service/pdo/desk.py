@@ -11,7 +11,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from enum import Enum
 
-from app.errors import PdoChangedError, PdoNoUndoError, PdoRefusedError, PdoUnknownError, UsageError
+from app.errors import PdoBusyError, PdoChangedError, PdoNoUndoError, PdoRefusedError, PdoUnknownError, UsageError
 from app.model.pdo.findings import PATHS, Finding, Severity, find
 from app.model.pdo.setup import PdoId, PdoSetup, PdoSetups, places_of
 from app.model.pdo.writes import PdoWrite, changed_pdos
@@ -108,6 +108,10 @@ class PdoDesk:
         """
 
         async def prepare() -> Carrying:
+            kept = self.kept.of(target.slug)
+            if kept is not None and kept.stand is Stand.OPEN:
+                # Its beginning is the only note of how the PDOs were set up: it is put back first.
+                raise PdoBusyError(device=target.slug, reason_key="page.pdo.busy.open")
             before = await self._read(worker, target)
             after = _edited(target, before, edits)
             self._require(worker, target, before, after, lambda _finding: True)
