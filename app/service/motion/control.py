@@ -17,13 +17,13 @@ from app.model.axis_state import ENERGISED, AxisState
 from app.model.description import Verify
 from app.model.values import to_scaled
 from app.service.devices import Target, decode
+from app.service.motion.interlocks import POSITION
 from app.service.stop import CONTROLWORD, STATUSWORD
 
 MODE: Final = Address(0x6060)
 MODE_SHOWN: Final = Address(0x6061)
 VELOCITY: Final = Address(0x606C)
 MANUAL: Final = Address(0x5040)
-POSITION: Final = Address(0x6064)
 EFC_TARGET: Final = Address(0x567A)
 _EFC: Final = 1 << 11
 _AT_TARGET_DEG: Final = 0.5
@@ -194,12 +194,15 @@ class Control:
             return False
         if not await self.number(CONTROLWORD) & _EFC or await self.state() not in ENERGISED:
             return False
-        far = abs(await self._degrees(POSITION) - await self._degrees(EFC_TARGET)) > _AT_TARGET_DEG
+        far = abs(await self.degrees(POSITION) - await self.degrees(EFC_TARGET)) > _AT_TARGET_DEG
         return far or not await self.until_still(timeout_s=0.0)
 
-    async def _degrees(self, address: Address) -> float:
+    async def degrees(self, address: Address) -> float:
+        """An angle of the axis, or its speed, by its own word. Raises AxisStateError where its scale is not known."""
         found = to_scaled(self.target.entry(address), await self.number(address), self.target.lookup)
-        return 0.0 if found is None else float(found.number)
+        if found is None:
+            raise AxisStateError(device=self.target.slug, state="–", wanted=address.short)
+        return float(found.number)
 
     async def until_still(self, timeout_s: float = STAND_TIMEOUT_S) -> bool:
         """Wait until the axis stands; whether it does."""

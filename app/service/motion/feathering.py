@@ -15,7 +15,7 @@ from app.model.axis_state import ENERGISED, AxisState
 from app.service.motion.control import EFC_TARGET, Word
 from app.service.motion.desk import Doing, Ended, MotionDesk, Running
 from app.service.motion.interlocks import POSITION
-from app.service.motion.moves import come_to_rest, degrees, wait
+from app.service.motion.moves import come_to_rest, wait
 
 BEGIN_TIMEOUT_S: Final = 2.0
 _REACHED_DEG: Final = 0.5
@@ -53,7 +53,7 @@ async def feather(desk: MotionDesk, slug: str, fence: int) -> Feathered:
 async def _drive(running: Running) -> Feathered:
     control, loop = running.control, asyncio.get_running_loop()
     running.let_go = Word.QUICK_STOP
-    target_deg, from_deg = await degrees(control, EFC_TARGET), await degrees(control, POSITION)
+    target_deg, from_deg = await control.degrees(EFC_TARGET), await control.degrees(POSITION)
     began_s = loop.time()
     if abs(from_deg - target_deg) <= _REACHED_DEG:
         return Feathered(from_deg, from_deg, target_deg, 0.0)
@@ -66,7 +66,7 @@ async def _drive(running: Running) -> Feathered:
         took_s = loop.time() - began_s
     finally:
         await come_to_rest(running, halt=False)
-    to_deg = await degrees(control, POSITION)
+    to_deg = await control.degrees(POSITION)
     if running.why is Ended.DONE and abs(to_deg - target_deg) > _REACHED_DEG:
         raise AxisStateError(device=running.slug, state=f"{to_deg:.2f}°", wanted=f"{target_deg:.2f}°")
     return Feathered(from_deg, to_deg, target_deg, took_s)
@@ -79,7 +79,7 @@ async def _until_there(running: Running, target_deg: float) -> None:
         state = await control.state()
         if state in _FAILED:
             raise AxisStateError(device=running.slug, state=state.name.lower(), wanted="operation_enabled")
-        near = abs(await degrees(control, POSITION) - target_deg) <= _REACHED_DEG
+        near = abs(await control.degrees(POSITION) - target_deg) <= _REACHED_DEG
         if control.overtaken:
             running.end(Ended.STOPPED)
         elif near and await control.until_still(timeout_s=0.0):

@@ -10,7 +10,7 @@ from app.model.address import Address
 from app.model.axis_state import AxisState
 from app.model.checks import Allow
 from app.model.datatypes import Raw
-from app.model.values import parse, to_scaled
+from app.model.values import parse
 from app.service.devices import Target
 from app.service.journal import Journal, Kind
 from app.service.motion.control import (
@@ -172,9 +172,9 @@ async def _go_on(running: Running) -> None:
 async def _until_limit(running: Running, speed_dps: float) -> None:
     """Wait until it is let go, or until the blade comes near the limit towards which it turns."""
     control = running.control
-    low_deg, high_deg = await degrees(control, LOWEST), await degrees(control, HIGHEST)
+    low_deg, high_deg = await control.degrees(LOWEST), await control.degrees(HIGHEST)
     while not running.over.is_set():
-        ahead_deg = await degrees(control, POSITION) + speed_dps * _MARGIN_S
+        ahead_deg = await control.degrees(POSITION) + speed_dps * _MARGIN_S
         if (speed_dps < 0 and ahead_deg <= low_deg) or (speed_dps > 0 and ahead_deg >= high_deg):
             running.end(Ended.LIMIT)
             return
@@ -221,7 +221,7 @@ async def come_to_rest(running: Running, halt: bool = True) -> None:
 
 
 async def _require_at(control: Control, angle_deg: float) -> None:
-    found_deg = await degrees(control, POSITION)
+    found_deg = await control.degrees(POSITION)
     if abs(found_deg - angle_deg) > _HOME_TOLERANCE_DEG:
         raise UnverifiedError(
             address=POSITION.short,
@@ -245,16 +245,9 @@ async def raw_of(control: Control, address: Address, number: float) -> Raw:
     return parse(target.description, entry, f"{number:.3f}".rstrip("0").rstrip("."), target.lookup)
 
 
-async def degrees(control: Control, address: Address) -> float:
-    """An angle of the axis, or its speed, by its own word."""
-    entry = control.target.entry(address)
-    found = to_scaled(entry, await control.number(address), control.target.lookup)
-    return 0.0 if found is None else float(found.number)
-
-
 async def _require_within(control: Control, angle_deg: float) -> None:
     """Raises LimitError: the drive would adjust a target outside its limits and go there (manual 5.10)."""
-    low_deg, high_deg = await degrees(control, LOWEST), await degrees(control, HIGHEST)
+    low_deg, high_deg = await control.degrees(LOWEST), await control.degrees(HIGHEST)
     if not low_deg <= angle_deg <= high_deg:
         raise _beyond(control.target, TARGET_POSITION, angle_deg, low_deg, high_deg)
 
