@@ -127,7 +127,7 @@ class Bench:
         turbine = self.sites.turbine(slug)
         descriptions = self.sites.describe(turbine)
         async with self._changing:
-            self.restores.require_idle()
+            self._require_idle()
             await self._end(person)
             found = await with_bitrates(turbine, self.options.listen_s)
             journal = self.journal.by(person)
@@ -168,7 +168,7 @@ class Bench:
     async def end_visit(self, reason: str, work_order: str, person: str) -> Visit:
         """End the visit with the values as left, and the connection with it. Raises NoVisitError, StoreError."""
         async with self._changing:
-            self.restores.require_idle()
+            self._require_idle()
             visits = self.office.visits
             visits.require()
             if self.connection is not None:
@@ -180,21 +180,28 @@ class Bench:
     async def disconnect(self, person: str) -> None:
         """End the connection; the recording is finished. Nothing happens where there is none.
 
-        Raises RestoreOpenError while a restore runs.
+        Raises RestoreOpenError while a restore runs, PdoBusyError while PDOs are changed.
         """
         async with self._changing:
-            self.restores.require_idle()
+            self._require_idle()
             await self._end(person)
 
     async def close(self) -> None:
         """End the connection at the end of the server, then the office. A restore that runs stays open, incomplete."""
         await self.restores.close()
         await self.scope.close()
-        await self.disconnect(self.options.person)
+        async with self._changing:
+            await self._end(self.options.person)
         if self.desk is not None:
             await self.desk.close()
         await asyncio.to_thread(self.indexing.close)
         await self.office.close()
+
+    def _require_idle(self) -> None:
+        """Raises RestoreOpenError, PdoBusyError: nothing that must come to its end is under way."""
+        self.restores.require_idle()
+        if self.motion is not None:
+            self.motion.require_left()
 
     async def _end(self, person: str) -> None:
         connection = self.connection

@@ -457,6 +457,11 @@ class MotionDesk:
                 # Nobody looks after it any more: where it has power, it shall stop.
                 self._heartbeats[axis.control.target.device.bus].withhold(axis.slug)
 
+    def require_left(self) -> None:
+        """The connection may end. Raises PdoBusyError while a device is kept still: it must not be left half-made."""
+        if self._kept_still is not None:
+            raise PdoBusyError(device=self._kept_still, reason_key="page.pdo.busy.changing")
+
     @contextmanager
     def kept_still(self, slug: str, page: str) -> Iterator[None]:
         """Nothing is begun at any axis meanwhile: what commands go by is changed in the device ``slug``.

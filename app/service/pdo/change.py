@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -29,7 +30,7 @@ from app.model.pdo.writes import PdoWrite, writes_between
 from app.service.devices import Target, decode
 from app.service.jobs import Job, JobRow, RowState
 from app.service.journal import Journal, Kind
-from app.service.pdo.kept import Kept, PdoChange
+from app.service.pdo.kept import Kept, PdoChange, Stand
 from app.service.write import write_raw
 
 
@@ -108,9 +109,9 @@ class Carrying:
             await asyncio.shield(task)
         except asyncio.CancelledError:
             self.cancelled = True
-            await asyncio.wait([task])
-            if not task.cancelled():
-                task.exception()
+            await _whole(task)
+            if isinstance(error := task.exception(), PdoBrokenError):
+                raise error from None  # what is left half-made must be told
             raise
 
     async def _run(self, job: Job) -> None:
@@ -124,6 +125,10 @@ class Carrying:
                 job.done += 1
             await self._prove(self.change.after)
         except (HubsideError, _CancelledError) as error:
+            if self.replaces is not None and self.undo and self.replaces.stand is Stand.OPEN:
+                # What stood before is the half-made state: whatever is whole by now stays.
+                self.journal.note(Kind.PDO_BROKEN, slug, **self._told())
+                raise PdoBrokenError(device=slug, reason_key=_why(error), again_key=_why(error)) from error
             await self._roll_back(job, error)
         await self.kept.put(slug, None if self.undo else self.change.applied())
         self.journal.note(Kind.PDO_PUT_BACK if self.undo else Kind.PDO_CHANGED, slug, **self._told())
@@ -169,3 +174,10 @@ class Carrying:
 
     def _told(self) -> dict[str, str]:
         return {"pdos": ", ".join(str(pdo) for pdo in self.change.after)}
+
+
+async def _whole(task: asyncio.Task[None]) -> None:
+    """Wait for its end, however often the job is cancelled meanwhile: it writes until then."""
+    while not task.done():
+        with suppress(asyncio.CancelledError):
+            await asyncio.wait([task])

@@ -156,8 +156,13 @@ async def test_a_change_that_is_cancelled_is_put_back_whole(person: Person) -> N
     async with asyncio.timeout(DEADLINE_S):
         while job.done < 3:  # noqa: ASYNC110  a job has no event
             await asyncio.sleep(0)
-    person.jobs.cancel(job.id)
+    with pytest.raises(PdoBusyError):
+        person.motion.require_left()  # the connection must not end in the middle of it
+    for _ in range(3):
+        person.jobs.cancel(job.id)
+        await asyncio.sleep(0)
     assert (await ended(job)).state is JobState.CANCELLED
+    person.motion.require_left()
     assert await person.setups() == before
     assert person.desk.kept.of(AXIS) is None
 
@@ -182,6 +187,8 @@ async def test_what_could_not_be_put_back_stays_open_and_is_put_back_later(perso
     with pytest.raises(RestoreOpenError):
         await person.undo()
     blocks.put([])
+    with pytest.raises(PdoBusyError):
+        await person.begin(changed(before[TPDO2], "6064/32", event_ms=30))
     undone = await person.undo()
     assert (undone.state, undone.error) == (JobState.DONE, None)
     assert await person.setups() == before
