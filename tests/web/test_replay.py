@@ -115,6 +115,17 @@ async def test_samples_are_in_the_list_and_open_by_their_name(server: Server) ->
     assert [one["id"] for one in (await server.client.get("/api/replay")).json()] == [TRIP]
 
 
+async def test_a_place_is_taken_by_who_opens_it_and_moves_nobody_who_looks_already(server: Server) -> None:
+    begin_ns = (await opened(server))["from_ns"]
+    assert (await server.client.delete(f"/api/replay/{TRIP}")).status_code == 200
+    stands = []
+    for at_s in (33, 12):
+        asked = {"recording": f"{TRIP}.mcap", "at_ns": begin_ns + at_s * 1_000_000_000}
+        doc = (await server.client.post("/api/replay", json=asked)).json()
+        stands.append((doc["cursor"]["t_ns"] - begin_ns) // 1_000_000_000)
+    assert stands == [33, 33]
+
+
 async def test_reads_are_those_of_the_live_bench_at_the_cursor(server: Server) -> None:
     doc = await opened(server)
     at = doc["from_ns"] + 30 * S

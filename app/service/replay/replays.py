@@ -62,8 +62,11 @@ class Replays:
         """All that are open, by name."""
         return self._sessions
 
-    async def open(self, path: Path) -> Session:
-        """The replay of a file; the one that is open where there is one. Raises RecordingError, SettingsError."""
+    async def open(self, path: Path, at_ns: int | None = None) -> Session:
+        """The replay of a file; the one that is open where there is one, else a new one that stands at ``at_ns``.
+
+        Raises RecordingError, SettingsError.
+        """
         name = path.name.removesuffix(".mcap")
         async with self._opening:
             found = self.find(name)
@@ -72,7 +75,7 @@ class Replays:
             await self._close(name)
             await self._make_room()
             source = await asyncio.to_thread(Source, path, self._known(), self._cache)
-            session = Session(source, self._clock)
+            session = Session(source, self._clock, at_ns)
             await asyncio.wrap_future(session.opened)
             self._sessions[name] = session
             self._unwatched_ns[name] = self._clock()

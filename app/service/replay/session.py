@@ -71,10 +71,12 @@ class _OvertakenError(Exception):
 class Session:
     """The replay of ``source``, which it closes at its end. ``monotonic_ns`` is the clock by which it plays.
 
+    It stands at ``at_ns`` first, in t_ns; at the beginning without.
+
     As the context of a page (``service.shown.Shown``) it may be read from any thread.
     """
 
-    def __init__(self, source: Source, monotonic_ns: Callable[[], int]) -> None:
+    def __init__(self, source: Source, monotonic_ns: Callable[[], int], at_ns: int | None = None) -> None:
         self.source = source
         self.epoch = 0
         self.stage: Stage | None = None
@@ -82,6 +84,7 @@ class Session:
         self._transport = Transport(source.from_ns, source.to_ns)
         self._attained = Attained()
         self._event_steps = EventSteps(source)
+        self._first_ns = self._transport.seek(source.from_ns if at_ns is None else at_ns, monotonic_ns())
         self._shown_ns = source.from_ns
         self._seeking = True
         self._played_ns = 0
@@ -181,7 +184,7 @@ class Session:
         failure: HubsideError | None = None
         try:
             with suppress(_OvertakenError):  # somebody wants to be elsewhere already
-                self._move(self.source.from_ns)
+                self._move(self._first_ns)
             self.opened.set_result(None)
             while self._wait():
                 self._carry_out_all()

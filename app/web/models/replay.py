@@ -19,11 +19,15 @@ Time = Annotated[int, Field(ge=0, le=2**62)]
 
 
 class OpenReplayRequest(BaseModel):
-    """``recording`` is the name of a file of the list."""
+    """``recording`` is the name of a file of the list.
+
+    ``at_ns`` is where the cursor stands if the recording is opened by this; one that is open already is not moved.
+    """
 
     model_config = ConfigDict(extra="forbid")
 
     recording: Annotated[str, Field(max_length=250)]
+    at_ns: Time | None = None
 
 
 class ReplayDoc(BaseModel):

@@ -41,7 +41,7 @@ async def open_replay(bench: BenchOf, opened: ReplaysOf, files: RecordingsOf, re
         raise NotFoundError(what=request.recording)
     if is_live(bench, path):
         raise RecordingLiveError(recording=path.name)
-    return ReplayDoc.of(await opened.open(path), opened)
+    return ReplayDoc.of(await opened.open(path, request.at_ns), opened)
 
 
 @router.get("/replay/{replay_id}")

@@ -7210,8 +7210,12 @@ export interface components {
         /**
          * OpenReplayRequest
          * @description ``recording`` is the name of a file of the list.
+         *
+         *     ``at_ns`` is where the cursor stands if the recording is opened by this; one that is open already is not moved.
          */
         OpenReplayRequest: {
+            /** At Ns */
+            at_ns?: number | null;
             /** Recording */
             recording: string;
         };

@@ -33,9 +33,12 @@ const base = (id: string) => `/api/replay/${encodeURIComponent(id)}`;
 /** The file whose replay has this name. */
 export const recordingOf = (id: string): string => `${id}.mcap`;
 
-/** Opens the replay of this name; the one that is open where there is one. */
-export const openReplay = (id: string) =>
-  send<ReplayDoc>("POST", "/api/replay", { recording: recordingOf(id) });
+/** Opens the replay of this name; the one that is open where there is one, else a new one that stands at `atNs`. */
+export const openReplay = (id: string, atNs: number | null = null) =>
+  send<ReplayDoc>("POST", "/api/replay", {
+    recording: recordingOf(id),
+    at_ns: atNs === null ? null : Math.round(atNs),
+  });
 
 /** Moves the cursor for all who look; what is not said is left as it is. */
 export const orderCursor = (id: string, order: CursorOrder): Promise<CursorLine> =>

@@ -17,6 +17,7 @@ const STANDING_MS = 250;
 /** Closer than this two places are the same: numbers of a browser hold no single nanoseconds. */
 const SAME_NS = 1000;
 const TRIES = 5;
+const LATEST_NS = 2 ** 62;
 
 export interface Replay {
   id: string;
@@ -41,7 +42,8 @@ export function useOpening(channel: Channel, id: string | undefined): Replay | n
   const [search] = usePageSearch();
   const opened = useQuery({
     queryKey: ["replay", id, "open"],
-    queryFn: () => openReplay(id ?? ""),
+    // It stands there from the first: a seek after it might undo what its person does meanwhile.
+    queryFn: () => openReplay(id ?? "", placeOf(channel.store.cursor?.t_ns ?? Number(search.at ?? NaN))),
     enabled: id !== undefined,
     retry: (failures, error) => !(error instanceof Problem) && failures < TRIES,
     gcTime: 0,
@@ -92,6 +94,9 @@ export function useOpening(channel: Channel, id: string | undefined): Replay | n
     };
   }, [id, doc, opened.error, refetch, transport, offered]);
 }
+
+/** What can be a time of a recording; null where a link holds something else. */
+const placeOf = (tNs: number): number | null => (tNs >= 0 && tNs <= LATEST_NS ? tNs : null);
 
 /**
  * Puts the cursor where this page was before, or where its link points. Where others look at the replay already nothing is

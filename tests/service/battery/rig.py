@@ -20,6 +20,7 @@ from app.twins.plant_power import PowerPlant
 from app.wire.frame import Can
 from tests.e2e.test_interoperation import EDS
 from tests.service.conftest import Served
+from tests.service.motion.rig import SteadyClock
 
 PMM, PMC = "wtg-07/blade-1/pmm", "wtg-07/blade-1/pmc"
 NODE = 1
@@ -29,7 +30,7 @@ COMMAND_TEST = 0x02
 @asynccontextmanager
 async def at_the_batteries(connection: Connection, store: Store) -> AsyncIterator[tuple[BatteryDesk, Target]]:
     """The desk, and the unit of blade 1."""
-    motion = MotionDesk(connection, connection.journal)
+    motion = MotionDesk(connection, connection.journal, now_s=SteadyClock())
     desk = BatteryDesk(connection, motion, Archive(store, connection.stamper))
     try:
         yield desk, connection.target(PMM)

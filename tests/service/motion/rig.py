@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
+from time import monotonic
 
 from app.model.address import Address
 from app.service.connection import Connection
@@ -14,6 +15,26 @@ from app.service.motion.interlocks import POSITION, Confirmed
 
 AXIS = "wtg-07/blade-1/pmc"
 PAGE = "page of the test"
+
+
+class SteadyClock:
+    """The monotonic clock without the times in which the whole machine stood still: nobody let go in those.
+
+    It is asked many times in ``_STILL_S``, or else nothing ran. What stops an axis on the real clock is held in
+    ``test_stopping.py``, where the server is a process of its own.
+    """
+
+    _STILL_S = 0.1
+
+    def __init__(self) -> None:
+        self._seen_s = self._now_s = monotonic()
+
+    def __call__(self) -> float:
+        """The time in s."""
+        seen_s = monotonic()
+        self._now_s += min(seen_s - self._seen_s, self._STILL_S)
+        self._seen_s = seen_s
+        return self._now_s
 
 
 class Page:
@@ -63,7 +84,7 @@ class Page:
 @asynccontextmanager
 async def at_the_desk(connection: Connection, confirmed: bool = True) -> AsyncIterator[tuple[MotionDesk, Page]]:
     """A desk with a page that has the lease and has confirmed what a person must look at."""
-    desk = MotionDesk(connection, connection.journal)
+    desk = MotionDesk(connection, connection.journal, now_s=SteadyClock())
     page = Page(desk)
     page.open()
     if confirmed:

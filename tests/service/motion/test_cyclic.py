@@ -31,7 +31,7 @@ from app.store.store import Store
 from app.wire.records import Record, SdoAccess, SdoSeen
 from tests.e2e.conftest import site_for
 from tests.service.conftest import Served
-from tests.service.motion.rig import AXIS, Page, angle_deg, at_the_desk, number
+from tests.service.motion.rig import AXIS, Page, SteadyClock, angle_deg, at_the_desk, number
 
 pytestmark = [pytest.mark.alone, pytest.mark.timeout(120)]  # targets come at a steady rate
 
@@ -236,7 +236,7 @@ async def test_what_a_killed_server_had_borrowed_is_put_back_by_the_next(served:
     with_store = Store.in_memory()
     first = Connection(turbine, known, Options("tester", tmp_path / "rec", listen_s=0.2))
     await first.open()
-    desk = MotionDesk(first, first.journal, Left(with_store))
+    desk = MotionDesk(first, first.journal, Left(with_store), SteadyClock())
     page = Page(desk)
     page.open()
     desk.confirm(page.fence, Confirmed(rotor_locked=True, people_out=True))

@@ -30,7 +30,7 @@ from app.service.stop import Command, command_all
 from app.wire.nmt import NmtState
 from tests.e2e.test_interoperation import until
 from tests.service.conftest import Served
-from tests.service.motion.rig import AXIS, Page, angle_deg, at_the_desk, number
+from tests.service.motion.rig import AXIS, Page, SteadyClock, angle_deg, at_the_desk, number
 
 pytestmark = pytest.mark.alone  # drives and pages miss each other after fractions of a second
 
@@ -248,7 +248,7 @@ async def test_a_clock_that_is_set_changes_nothing(connection: Connection, monke
 async def test_what_a_killed_server_left_is_put_back_by_the_next(connection: Connection) -> None:
     left = Left()
     before = await number(connection, ABORT), await number(connection, WATCH)
-    killed = MotionDesk(connection, connection.journal, left)
+    killed = MotionDesk(connection, connection.journal, left, SteadyClock())
     page = Page(killed)
     page.open()
     killed.confirm(page.fence, Confirmed(rotor_locked=True, people_out=True))

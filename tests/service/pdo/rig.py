@@ -15,6 +15,7 @@ from app.service.pdo.desk import Edit, PdoDesk, Worker
 from app.store.store import Store
 from app.wire.nmt import NmtCommand, NmtState
 from tests.model.pdo.rig import TPDO2, enabled
+from tests.service.motion.rig import SteadyClock
 
 AXIS = "wtg-07/blade-1/pmc"
 PAGE = "page of the test"
@@ -26,7 +27,7 @@ class Person:
 
     def __init__(self, connection: Connection, store: Store, motion: MotionDesk | None = None) -> None:
         self.connection = connection
-        self.motion = motion or MotionDesk(connection, connection.journal)
+        self.motion = motion or MotionDesk(connection, connection.journal, now_s=SteadyClock())
         self.desk = PdoDesk(store, connection.stamper)
         self.jobs = Jobs()
         journal = connection.journal.by("A. Technician")

@@ -39,6 +39,15 @@ def session() -> Iterator[Session]:
     opened.close()
 
 
+@pytest.mark.parametrize(("seconds", "expected_s"), [(33, 33), (-5, 0)])
+def test_it_stands_at_the_asked_place_from_the_first(seconds: int, expected_s: int) -> None:
+    source = Source(TRIP, {})
+    session = Session(source, time.monotonic_ns, source.from_ns + seconds * S)
+    session.opened.result(DEADLINE_S)
+    assert session.cursor().t_ns == source.from_ns + expected_s * S
+    session.close()
+
+
 def state_of(stage: ReplayStage) -> dict[str, Any]:
     """All that is known, but for versions, which count changes. A keyframe holds the last 200 events.
 
