@@ -44,6 +44,8 @@ class Word(IntEnum):
     NEW_SET_POINT = 0x001F
     QUICK_STOP = 0x010B
     DISABLE_VOLTAGE = 0x010C
+    NO_POWER = 0x0104
+    """As the one before, with bit 3 clear: the mode can be changed then (manual 5.9)."""
     HOME = 0x0116
     FAULT_RESET = 0x0186
     FEATHER = 0x080F
@@ -257,6 +259,26 @@ class Control:
             raise UnverifiedError(
                 address=MODE.short, name="mode", sent=str(int(mode)), found=str(found), reason="the mode did not change"
             )
+
+    async def mode_back(self, mode: int) -> bool:
+        """Give an axis without power the mode that it had; one that had none gets one that goes nowhere by itself.
+
+        False where that must wait: an EFC is in force, or the axis does not listen. Raises OvertakenError where
+        somebody commands it meanwhile, and what a write raises.
+        """
+        mode = mode or AxisMode.PROFILE_POSITION
+        self.own()  # before the look: a FEATHER that comes after it is not ended by what is sent here
+        if await self.number(MODE_SHOWN) == mode:
+            return True
+        word = await self.number(CONTROLWORD)
+        if word & _EFC or not await self.status() & REMOTE or await self.state() in ENERGISED:
+            return False
+        if word & _ENABLE_OPERATION:
+            self.word(Word.NO_POWER)
+            await self._until_heard()
+        self.require_own()
+        await self.driver.write(self.target.node, MODE, mode.to_bytes(1, "little", signed=True), verify=Verify.ACK)
+        return await self.number(MODE_SHOWN) == mode
 
     async def _until_heard(self) -> None:
         """Wait until bit 3 of the word that stands in the device is 0 too: a PDO may be worked later than a request."""

@@ -1,6 +1,6 @@
 """What was changed for motion and is not put back yet: kept, so that it can be after a server was killed.
 
-Settings stand in RAM alone: a restart of the device ends them too, and its NMT state with them.
+Settings stand in RAM alone: a restart of the device ends them too, and its NMT state and mode of operation with them.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ class Changed(NamedTuple):
 class _Found:
     objects: dict[Address, Changed] = field(default_factory=dict)
     nmt: NmtState | None = None
+    mode: int | None = None
 
 
 class Left:
@@ -52,6 +53,11 @@ class Left:
         found = self._found.get(device)
         return None if found is None else found.nmt
 
+    def mode_of(self, device: str) -> int | None:
+        """The mode of operation (6061h) that the axis had before it was prepared; None where it has it again."""
+        found = self._found.get(device)
+        return None if found is None else found.mode
+
     async def note(self, device: str, address: Address, changed: Changed) -> None:
         """It is about to be written; kept before that. What it held first counts. Raises StoreError."""
         objects = self._found.setdefault(device, _Found()).objects
@@ -65,6 +71,12 @@ class Left:
         found.nmt = found.nmt or state
         await self._keep()
 
+    async def note_mode(self, device: str, mode: int) -> None:
+        """The mode is about to be changed; it was ``mode``. The first one counts. Raises StoreError."""
+        found = self._found.setdefault(device, _Found())
+        found.mode = mode if found.mode is None else found.mode
+        await self._keep()
+
     async def forget(self, device: str, address: Address) -> None:
         """It holds again what it held. Raises StoreError."""
         if device in self._found and self._found[device].objects.pop(address, None) is not None:
@@ -76,9 +88,15 @@ class Left:
             self._found[device].nmt = None
             await self._tidy(device)
 
+    async def forget_mode(self, device: str) -> None:
+        """The axis has its mode again. Raises StoreError."""
+        if device in self._found:
+            self._found[device].mode = None
+            await self._tidy(device)
+
     async def _tidy(self, device: str) -> None:
         found = self._found[device]
-        if not found.objects and found.nmt is None:
+        if not found.objects and found.nmt is None and found.mode is None:
             del self._found[device]
         await self._keep()
 
@@ -90,7 +108,7 @@ class Left:
 
 def _document(found: _Found) -> dict[str, Any]:
     objects = [[address.short, changed.was.hex(), changed.now.hex()] for address, changed in found.objects.items()]
-    return {"objects": objects, "nmt": None if found.nmt is None else found.nmt.name}
+    return {"objects": objects, "nmt": None if found.nmt is None else found.nmt.name, "mode": found.mode}
 
 
 def _read(document: Any) -> dict[str, _Found]:
@@ -103,6 +121,7 @@ def _read(document: Any) -> dict[str, _Found]:
                 for text, was, now in found["objects"]
             },
             None if found["nmt"] is None else NmtState[found["nmt"]],
+            found.get("mode"),
         )
         for device, found in document.items()
     }

@@ -8,21 +8,32 @@ operation enabled. At the end the old values are written back, and the node gets
 from __future__ import annotations
 
 import asyncio
+import logging
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Final
 
-from app.errors import HubsideError, InterlockError, NotHeldError
+from app.errors import (
+    AxisStateError,
+    DeviceError,
+    HubsideError,
+    InterlockError,
+    NoAnswerError,
+    NotHeldError,
+    OvertakenError,
+)
 from app.model.address import Address
 from app.model.axis_state import AxisState
 from app.model.checks import Allow
 from app.service.devices import decode
 from app.service.journal import Journal, Kind
-from app.service.motion.control import REMOTE, AxisMode, Control
+from app.service.motion.control import MODE_SHOWN, REMOTE, AxisMode, Control
 from app.service.motion.heartbeat import Heartbeat
 from app.service.motion.left import Changed, Left
 from app.service.write import write_raw
 from app.wire.nmt import NmtCommand, NmtState
+
+log = logging.getLogger(__name__)
 
 ABORT_CONNECTION: Final = Address(0x6007)
 QUICK_STOP: Final = 3
@@ -67,6 +78,7 @@ async def set_up(axis: Prepared, heartbeat: Heartbeat, left: Left, journal: Jour
     control = axis.control
     entry = await _free_consumer(control, heartbeat.node)
     watch = (heartbeat.node << 16 | CONSUMER_MS).to_bytes(4, "little")
+    await left.note_mode(axis.slug, await control.number(MODE_SHOWN))
     await _change(axis, ABORT_CONNECTION, QUICK_STOP.to_bytes(2, "little"), left, journal)
     await _change(axis, entry, watch, left, journal)
     heartbeat.watch(axis.slug)
@@ -179,7 +191,7 @@ async def after_proof(control: Control) -> None:
 
 
 async def put_back(control: Control, left: Left, journal: Journal) -> None:
-    """Write what stood there before, newest first. What no longer holds what we wrote is left as it is.
+    """Write what stood there before, newest first, the mode last. What no longer holds what we wrote is left as it is.
 
     An axis that has power keeps its watch: it is waited for, then InterlockError. Raises what reading and writing
     raise, StoreError; what is done by then is done.
@@ -191,6 +203,18 @@ async def put_back(control: Control, left: Left, journal: Journal) -> None:
         if await control.driver.read(node, address) == changed.now:
             await _write(control, address, changed.was, journal)
         await left.forget(slug, address)
+    await _mode_back(control, left)
+
+
+async def _mode_back(control: Control, left: Left) -> None:
+    """The axis gets its mode back; where that cannot be now, it stays noted. Raises StoreError."""
+    slug = control.target.slug
+    mode = left.mode_of(slug)
+    try:
+        if mode is not None and await control.mode_back(mode):
+            await left.forget_mode(slug)
+    except (AxisStateError, DeviceError, NoAnswerError, OvertakenError) as error:
+        log.warning("%s: mode %s is not put back: %s", slug, mode, error.code)
 
 
 async def give_nmt_back(control: Control, left: Left, journal: Journal) -> None:

@@ -176,6 +176,13 @@ async def test_silence_is_a_quick_stop(connection: Connection) -> None:
         assert {address: await number(connection, address) for address in BORROWED} == before
 
 
+async def put_back(desk: MotionDesk) -> None:
+    """Wait until all is as it was before the preparation."""
+    async with asyncio.timeout(10.0):
+        while desk.left.of(AXIS) or desk.prepared:  # noqa: ASYNC110  the store has no event for it
+            await asyncio.sleep(0.02)
+
+
 async def test_the_lease_given_back_is_a_quick_stop(connection: Connection) -> None:
     async with at_the_desk(connection) as (desk, page):
         await stand(connection, desk, page)
@@ -183,9 +190,9 @@ async def test_the_lease_given_back_is_a_quick_stop(connection: Connection) -> N
         desk.give_back_lease(page.fence)
         assert (await order).why is Ended.LEASE
         await stands(connection)
-        async with asyncio.timeout(10.0):
-            while desk.left.of(AXIS):  # noqa: ASYNC110  the store has no event for it
-                await asyncio.sleep(0.02)
+        await put_back(desk)
+        assert await number(connection, MODE) == 1
+        assert desk.left.mode_of(AXIS) is None
 
 
 @pytest.mark.parametrize("command", [Command.STOP, Command.FEATHER])
@@ -201,6 +208,9 @@ async def test_stop_and_feather_end_it_and_stay_in_force(connection: Connection,
                     await asyncio.sleep(0.05)
         else:
             assert 78.8 < await stands(connection) < 81.2
+            desk.give_back_lease(page.fence)
+            await put_back(desk)
+            assert await number(connection, MODE) == 1
 
 
 async def test_a_fault_ends_it_and_the_run_says_so(connection: Connection, served: Served) -> None:

@@ -245,8 +245,12 @@ async def test_a_clock_that_is_set_changes_nothing(connection: Connection, monke
         assert desk.last.why is Ended.SILENT
 
 
-async def test_what_a_killed_server_left_is_put_back_by_the_next(connection: Connection) -> None:
+@pytest.mark.parametrize(("had", "gets"), [(6, 6), (0, 1)])
+async def test_what_a_killed_server_left_is_put_back_by_the_next(connection: Connection, had: int, gets: int) -> None:
+    """The mode too; an axis that had none yet is left in one that goes nowhere by itself."""
     left = Left()
+    target = connection.target(AXIS)
+    await connection.driver(target).write(target.node, Address(0x6060), bytes([had]))
     before = await number(connection, ABORT), await number(connection, WATCH)
     killed = MotionDesk(connection, connection.journal, left, SteadyClock())
     page = Page(killed)
@@ -263,6 +267,7 @@ async def test_what_a_killed_server_left_is_put_back_by_the_next(connection: Con
     fence = after.take_lease("tester", "next").fence
     await after.put_back(AXIS, fence)
     assert (await number(connection, ABORT), await number(connection, WATCH)) == before
+    assert await number(connection, Address(0x6061)) == gets
     await until(lambda: nmt_state(connection) is NmtState.PRE_OPERATIONAL)
     assert motion_line(after).left == ()
     await after.close()
