@@ -2,9 +2,10 @@
 
 The real thing: ``hubside serve`` beside twins in a process of their own. STOP is pressed as the page does, by a
 request; its frame is seen by another client of the same simulated bus. Meanwhile nothing else runs, or a backup of all
-six devices, or a save of 10 s at every axis; first while the nodes are pre-operational, so that the command goes by
-SDO, then while they are operational, by RPDO. The peer sends the same command through the queue of the same driver, as
-an ordinary write of 6040h: it waits for what runs before it. Both clocks are the host's monotonic one.
+six devices, or a save of 10 s at every axis, or a restore of a station; first while the nodes are pre-operational, so
+that the command goes by SDO, then while they are operational, by RPDO. The peer sends the same command through the
+queue of the same driver, as an ordinary write of 6040h: it waits for what runs before it. Both
+clocks are the host's monotonic one.
 
 Three axes are stopped by each press; the last of the three frames counts.
 """
@@ -31,6 +32,7 @@ from app.model.description import Verify
 from app.model.description_file import load_builtin
 from app.wire.frame import Can, Frame, Stamper
 from app.wire.nmt import NmtCommand
+from bench._busy import LOOK_S, Busy
 from bench._priority import preferred
 from bench._process import Child
 from bench._result import Result
@@ -41,14 +43,12 @@ TARGET: Final = 10.0
 LIMIT_S: Final = 0.050
 BITRATE: Final = 500_000
 AXES: Final = (11, 12, 13)
-SLUGS: Final = tuple(f"wtg-07/blade-{blade}/pmc" for blade in (1, 2, 3))
 CONTROLWORD: Final = Address(0x6040)
 QUICK_STOP: Final = (0x010B).to_bytes(2, "little")
 SAVE_MS: Final = 10_000
 MARGIN_S: Final = 30.0
-FIRST_LOOK_S: Final = 4.0
+FIRSTLOOK_S: Final = 4.0
 """The server reads all devices first."""
-_LOOK_S: Final = 0.05
 _SAVE: Final = Address(0x1010, 3)
 _RPDO1: Final = 0x200
 _SDO: Final = 0x600
@@ -188,22 +188,23 @@ async def _ours(url: str, address: str, presses: int) -> list[Run]:
         _watching(address) as watch,
     ):
         await client.get(url)
-        await asyncio.sleep(FIRST_LOOK_S)
+        await asyncio.sleep(FIRSTLOOK_S)
         await client.post("/api/live/consent", json={})  # a page has asked for something before it stops anything
-        runs = []
+        runs, page = [], Busy(client)
         for way in ("by SDO", "by RPDO"):
             if way == "by RPDO":
                 watch.start(AXES)
-            page = _Busy(client)
             for name, begin in (
                 ("alone", page.nothing),
                 ("beside a backup", page.backup),
                 ("beside saves", page.saves),
+                ("beside a restore", page.restore),
             ):
-                times = presses // 8 if begin == page.saves else presses  # these take seconds each
+                long = begin in (page.saves, page.restore)  # these take seconds each
+                times = presses // 8 if long else presses
                 times_s = [await _press(client, watch, begin) for _ in range(times)]
                 runs.append(Run(f"{way}, {name}", times_s))
-            await page.end()
+        await page.end()
         return runs
 
 
@@ -215,42 +216,6 @@ async def _press(client: httpx.AsyncClient, watch: Watch, begin: Callable[[], Aw
     took_s = await watch.last(MARGIN_S) - started_s
     (await answer).raise_for_status()
     return took_s
-
-
-class _Busy:
-    """What a page has the server do meanwhile."""
-
-    def __init__(self, client: httpx.AsyncClient) -> None:
-        self._client = client
-        self._job: str | None = None
-        self._saves: dict[str, asyncio.Task[httpx.Response]] = {}
-
-    async def nothing(self) -> None:
-        """No more than it does by itself."""
-        await asyncio.sleep(_LOOK_S)
-
-    async def backup(self) -> None:
-        """A backup runs: another one where the last has ended."""
-        state = None
-        if self._job is not None:
-            state = (await self._client.get(f"/api/live/jobs/{self._job}")).json()["state"]
-        if state != "running":
-            answer = await self._client.post("/api/live/backup", json={"reason": "bench"})
-            self._job = answer.json()["id"]
-        await asyncio.sleep(_LOOK_S)
-
-    async def saves(self) -> None:
-        """A save of 10 s runs at every axis: another one where STOP has ended the last."""
-        for slug in SLUGS:
-            if slug not in self._saves or self._saves[slug].done():
-                self._saves[slug] = asyncio.create_task(self._client.post(f"/api/live/devices/{slug}/save", json={}))
-        await asyncio.sleep(2 * _LOOK_S)
-
-    async def end(self) -> None:
-        """Wait for nothing that still runs: the next STOP ends it."""
-        for save in self._saves.values():
-            save.cancel()
-        await asyncio.gather(*self._saves.values(), return_exceptions=True)
 
 
 # -- the peer ---------------------------------------------------------------------------------
@@ -265,7 +230,7 @@ async def _peer(address: str, presses: int) -> Run:
         try:
             for _ in range(presses):
                 saves = [asyncio.create_task(driver.write(node, _SAVE, b"save", verify=Verify.ACK)) for node in AXES]
-                await asyncio.sleep(2 * _LOOK_S)
+                await asyncio.sleep(2 * LOOK_S)
                 watch.clear()
                 started_s = time.monotonic()
                 stops = [driver.write(node, CONTROLWORD, QUICK_STOP, verify=Verify.ACK) for node in AXES]
