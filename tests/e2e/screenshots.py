@@ -31,6 +31,8 @@ COLOURS: Final = 256
 BUSY: Final = "main .mantine-Loader-root, main .mantine-Skeleton-root, main [aria-busy=true]"
 THEMES: Final = ("dark", "light")
 
+SETUP: Final = "/axis?blade=1&tab=setup&picture="
+
 
 @dataclass(frozen=True)
 class Shot:
@@ -52,6 +54,13 @@ SHOTS: Final = (
     Shot("overview", "/", "[data-testid=blade-3] [data-testid=angle]:has-text('°')", scene=True),
     Shot("overview-de", "/", "[data-testid=blade-3] [data-testid=angle]:has-text('°')", "de", True, ("dark",)),
     Shot("axis", "/axis?blade=1", "[data-testid=axis-angle]:has-text('°')", scene=True),
+    Shot("axis-temperatures", f"{SETUP}temperatures", "[data-testid=picture-temperatures]"),
+    Shot("axis-masks", f"{SETUP}masks", "[data-testid=picture-masks]"),
+    Shot("axis-ladder", f"{SETUP}ladder", "[data-testid=picture-ladder]"),
+    Shot("axis-battery", f"{SETUP}battery", "[data-testid=battery-picture]"),
+    Shot("axis-gear", f"{SETUP}gear", "[data-testid=gear-picture]"),
+    Shot("axis-scope", "/axis?blade=1&tab=scope", "[data-testid=chosen-signals]"),
+    Shot("axis-pdo", "/axis?blade=1&tab=pdo", "[data-testid=pdo-close], [data-testid^=pdo-]"),
     Shot("parameters", "/parameters?device=wtg-07/blade-1/pmm", "main [data-testid^='value-']"),
     Shot(
         "parameters-side",
