@@ -130,11 +130,12 @@ class Finding:
 
 
 def is_stop_path(setup: PdoSetup) -> bool:
-    """True for a receive PDO by which STOP goes: the controlword alone, used as soon as it comes."""
+    """True for a receive PDO by which STOP goes: the controlword alone, used as soon as it comes, however often."""
     return (
         setup.id.direction is Direction.RECEIVE
         and setup.enabled
         and setup.on_event
+        and not setup.parameters.inhibit_100us
         and [(one.address, one.bits) for one in setup.mapped] == [(CONTROLWORD, _WORD_BITS)]
     )
 
