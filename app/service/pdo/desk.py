@@ -193,7 +193,7 @@ class PdoDesk:
             target.past_gate(),
             planned(target, before, after),
             change,
-            change if undone is None else replace(undone, stand=Stand.OPEN),
+            change if undone is None else undone.opened(),
             self.kept.of(target.slug),
             self.kept,
             worker.journal,
