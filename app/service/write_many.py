@@ -241,6 +241,8 @@ async def _write_clearly(change: Change, row: JobRow, allow: Allow, known: Known
     if row.error is None:
         known.put(change.place, change.raw)
         return True
+    if isinstance(row.error, BusLostError):
+        return False  # whatever comes back behind it may have started anew: nobody goes on from there by himself
     unclear = isinstance(row.error, (NoAnswerError, UnverifiedError))
     if not unclear and isinstance(row.error, RefusedError) and not isinstance(row.error, ConflictError):
         return True  # nothing was sent
