@@ -74,9 +74,12 @@ class UndoStand(Enum):
     UNKNOWN = "unknown"
 
 
-def preview(stage: Stage, target: Target, edits: Sequence[Edit]) -> Preview:
-    """What the edits would do, by what is known; nothing is sent. Raises PdoUnknownError, PdoChangedError."""
-    before = setups_of(target)
+def preview(stage: Stage, target: Target, edits: Sequence[Edit], before: PdoSetups | None = None) -> Preview:
+    """What the edits would do, by what is known, or from ``before``; nothing is sent.
+
+    Raises PdoUnknownError, PdoChangedError.
+    """
+    before = setups_of(target) if before is None else before
     after = _edited(target, before, edits)
     findings = find(target.description, places_of(target.description), before, after, taken_by_others(stage, target))
     return Preview(findings, planned(target, before, after), cost(stage, target, before, after))

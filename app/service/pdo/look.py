@@ -13,7 +13,7 @@ from app.model.address import Address
 from app.model.datatypes import DataType
 from app.model.description import Description
 from app.model.pdo.identifiers import EMCY, SYNC, Taken, Use, bus_wide
-from app.model.pdo.load import PdoLoad, estimate, total
+from app.model.pdo.load import Basis, PdoLoad, estimate, total
 from app.model.pdo.setup import PdoId, PdoSetup, PdoSetups, parse_setup, places_of
 from app.service.devices import Target
 from app.service.stage import Stage
@@ -115,7 +115,8 @@ def taken_by_others(stage: Stage, target: Target) -> list[Taken]:
 def cost(stage: Stage, target: Target, before: PdoSetups, after: PdoSetups) -> Cost:
     """What the PDOs of all nodes of the target's bus cost now, and would with ``after`` in the target.
 
-    A PDO that stays as it is counts as it was measured, where its node is operational.
+    A PDO that stays as it is counts as it was measured, where its node is operational. Of those that change, only what
+    was measured is in the load of the bus now, and no more than that leaves it.
     """
     bus = target.device.bus
     seen, bitrate = seen_on(stage, bus), stage.buses[bus].bitrate
@@ -133,8 +134,11 @@ def cost(stage: Stage, target: Target, before: PdoSetups, after: PdoSetups) -> C
             else:
                 then[other.slug, pdo] = estimate(new, bitrate, seen.sync_hz, None)
     pdos_now, pdos_after = total(now.values()), total(then.values())
+    changed = [key for key in now if then[key] is not now[key]]
+    leaves = total(now[key] for key in changed if now[key].basis is Basis.MEASURED)
     bus_now = stage.buses[bus].bus_load(stage.stamper())
-    return Cost(now, then, bus_now, max(0.0, bus_now + pdos_after - pdos_now), pdos_now, pdos_after)
+    bus_after = max(0.0, bus_now - leaves) + total(then[key] for key in changed)
+    return Cost(now, then, bus_now, bus_after, pdos_now, pdos_after)
 
 
 def measured_hz(setup: PdoSetup, seen: Seen) -> float:
