@@ -45,6 +45,7 @@ from app.wire.records import Source
 from tests.model.pdo.rig import RPDO1, RPDO2, TPDO1, TPDO2, TPDO3, changed, disabled, enabled
 from tests.service.conftest import Served
 from tests.service.pdo.rig import AXIS, DEADLINE_S, PAGE, Person, ended, with_cob_id
+from tests.service.restore.conftest import holding
 
 POSITION = Address(0x6064)
 
@@ -342,8 +343,54 @@ async def test_identifiers_of_the_whole_turbine_are_known(person: Person) -> Non
         if target.slug != AXIS:
             assert Taken(0x180 + target.node, False, Use.TPDO, target.slug, 1) in taken
             assert Taken(0x200 + target.node, False, Use.RPDO, target.slug, 1) in taken
+            commands = Taken(0x200 + target.node, False, Use.COMMANDS, target.slug, 1)
+            assert (commands in taken) is target.slug.endswith("/pmc")
     before = await person.setups()
     other = person.connection.target("wtg-07/blade-2/pmc").node
     with pytest.raises(PdoRefusedError) as refused:
         await person.begin(enabled(before[TPDO2], cob_id=0x40000180 + other))
     assert refused.value.details["by"] == "wtg-07/blade-2/pmc"
+    with pytest.raises(PdoRefusedError) as refused:
+        await person.begin(enabled(before[RPDO2], cob_id=0x200 + other))
+    assert refused.value.details["reason_key"] == "page.pdo.finding.commands_other"
+
+
+async def test_an_emergency_object_that_is_off_takes_no_identifier(served: Served, person: Person) -> None:
+    target, driver = person.target, person.connection.driver(person.target)
+    own, cell = Taken(0x80 + target.node, False, Use.EMCY, AXIS), served.turbine.devices[target.node].store.find(0x1014)
+    assert cell is not None and own in taken_by_others(person.connection, target)
+    end = holding(cell, 0x80000000 + own.can_id)  # the unit lets nobody write it
+    await driver.read(target.node, Address(0x1014))
+    async with asyncio.timeout(DEADLINE_S):
+        while own in taken_by_others(person.connection, target):  # noqa: ASYNC110  the live state has no event for it
+            await asyncio.sleep(0.01)
+    end()
+
+
+async def test_what_an_unknown_device_sends_is_seen_and_told(served: Served, person: Person) -> None:
+    stranger = 0x2F0
+    before = await person.setups()
+    network = canopen.Network()
+    network.connect(interface="socketcand", host="127.0.0.1", port=served.server.port, channel="can0")
+    sending = network.send_periodic(stranger, b"\x01\x02", 0.02)
+    try:
+        async with asyncio.timeout(DEADLINE_S):
+            unknown = Taken(stranger, False, Use.SEEN, None)
+            while unknown not in taken_by_others(person.connection, person.target):  # noqa: ASYNC110  no event for it
+                await asyncio.sleep(0.02)
+    finally:
+        sending.stop()
+        network.disconnect()
+    wanted = enabled(before[TPDO2], cob_id=0x40000000 + stranger)
+    found = preview(person.connection, person.target, [Edit(before[TPDO2], wanted)], before).findings
+    assert Code.COB_ID_SEEN in {one.code for one in found if one.pdo == TPDO2}
+
+
+async def test_what_is_sent_by_nobody_yet_leaves_no_load_when_it_ends(person: Person) -> None:
+    """The node is not operational: its PDOs cost nothing now, and nothing less once one of them is off."""
+    before = await person.setups()
+    await person.apply(enabled(before[TPDO2], event_ms=10))
+    now = await person.setups()
+    found = preview(person.connection, person.target, [Edit(now[TPDO2], disabled(now[TPDO2]))], now).cost
+    assert found.pdos_after < found.pdos_now
+    assert found.bus_after == found.bus_now
