@@ -213,8 +213,6 @@ async def _check_all(rows: Sequence[Row], allow: Allow) -> None:
             found = planned.get((target.slug, address))
             return target.lookup(address) if found is None else found
 
-        if isinstance(row.error, DeviceBusyError):
-            continue
         try:
             await target.pass_gate(change.driver)
             check_write(target.description, target.entry(change.address), change.raw, lookup, allow=allow)

@@ -175,12 +175,12 @@ async def test_of_a_restore_and_a_change_that_begin_at_once_one_is_refused(bench
     assert (await ended(job)).state is JobState.DONE, job.error
     undone = await person.undo()
     assert undone.state is JobState.DONE
-    restore_id, refused = await asyncio.gather(
+    restore_id, late = await asyncio.gather(
         bench.desk.begin(bench.connection, prepared, prepared.hash),
         person.desk.apply(person.worker, person.target, edits),
         return_exceptions=True,
     )
-    assert isinstance(restore_id, str) and isinstance(refused, DeviceBusyError)
+    assert isinstance(restore_id, str) and isinstance(late, DeviceBusyError)
     assert await bench.desk.wait(restore_id) is End.NEW
 
 

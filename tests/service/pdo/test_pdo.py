@@ -379,7 +379,7 @@ async def test_what_an_unknown_device_sends_is_seen_and_told(served: Served, per
             while unknown not in taken_by_others(person.connection, person.target):  # noqa: ASYNC110  no event for it
                 await asyncio.sleep(0.02)
     finally:
-        sending.stop()
+        sending.stop()  # type: ignore[no-untyped-call]
         network.disconnect()
     wanted = enabled(before[TPDO2], cob_id=0x40000000 + stranger)
     found = preview(person.connection, person.target, [Edit(before[TPDO2], wanted)], before).findings
