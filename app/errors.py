@@ -24,6 +24,7 @@
     │   ├── LimitError                      the value is out of range; names the limit
     │   ├── PreconditionError               another object or state forbids it
     │   ├── OrderError                      no order of writes keeps all rules at every step
+    │   ├── NotWrittenError                 a write before it in its batch left a value that is not known
     │   ├── ConflictError                   another value than the one that was seen stands in RAM
     │   ├── OvertakenError                  STOP or FEATHER came before the write left
     │   ├── MotionError                     the write could set an axis in motion
@@ -49,6 +50,7 @@
     │   ├── IncidentChangedError            somebody else has changed the incident meanwhile
     │   ├── IncidentRecordingError          the recording of an incident is not there, or is another file
     │   ├── AnnotationUnknownError          no such annotation
+    │   ├── DeviceBusyError                 something is under way at the device that must not be cut in two
     │   ├── RestoreOpenError                a restore of the station is not finished
     │   ├── RestoreRefusedError             the pre-check of a restore found reasons against it
     │   ├── RestoreChangedError             the plan of a restore is no longer the one that was looked at
@@ -265,6 +267,15 @@ class OrderError(RefusedError):
     code = "order"
 
 
+class NotWrittenError(RefusedError):
+    """Its batch ended before it: of a write that had no clear end nobody knows what it left, and the order rests on it.
+
+    Nothing was written. Details: address, name, after (the address of that write), after_device.
+    """
+
+    code = "not_written"
+
+
 class ConflictError(RefusedError):
     """RAM no longer holds what the change was made from. Details: address, name, expected, found."""
 
@@ -443,6 +454,12 @@ class AnnotationUnknownError(RefusedError):
     """No such annotation. Details: annotation."""
 
     code = "annotation_unknown"
+
+
+class DeviceBusyError(RefusedError):
+    """Something is under way at the device that must not be cut in two. Details: device, work_key, person."""
+
+    code = "device_busy"
 
 
 class RestoreOpenError(RefusedError):

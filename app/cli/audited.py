@@ -5,10 +5,14 @@ from __future__ import annotations
 import argparse
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from typing import TYPE_CHECKING
 
 from app.cli.output import Output
 from app.errors import StoreInUseError
 from app.service.connection import Connection
+
+if TYPE_CHECKING:
+    from app.store.store import Store
 
 
 @asynccontextmanager
@@ -19,10 +23,9 @@ async def audited(arguments: argparse.Namespace, output: Output, connection: Con
     them as those of another master. Raises StoreError, before anything is done.
     """
     # Late: most commands on a bus change nothing, and need not wait for the store's libraries.
-    from app.service.office.audit import AuditLog
     from app.service.restore.blocking import block_of
     from app.store.database import FILE
-    from app.store.restore_rows import open_restores, peek_open
+    from app.store.restore_rows import peek_open
     from app.store.store import Store
 
     try:
@@ -32,17 +35,28 @@ async def audited(arguments: argparse.Namespace, output: Output, connection: Con
         output.say("cli.no_audit")
         yield
         return
-    journal = connection.journal
     try:
-        connection.gate.blocks.put(block_of(row) for row in store.call(open_restores))
-        audit = AuditLog(store)
-        for entry in journal.latest():
-            audit.take(entry)
-        end = journal.listen(audit.take)
-        try:
+        async with audited_in(store, connection):
             yield
-        finally:
-            end()
-            await audit.close()
     finally:
         store.close()
+
+
+@asynccontextmanager
+async def audited_in(store: Store, connection: Connection) -> AsyncIterator[None]:
+    """As ``audited``, for a command that has the store already."""
+    from app.service.office.audit import AuditLog
+    from app.service.restore.blocking import block_of
+    from app.store.restore_rows import open_restores
+
+    journal = connection.journal
+    connection.gate.blocks.put(block_of(row) for row in store.call(open_restores))
+    audit = AuditLog(store)
+    for entry in journal.latest():
+        audit.take(entry)
+    end = journal.listen(audit.take)
+    try:
+        yield
+    finally:
+        end()
+        await audit.close()

@@ -26,6 +26,7 @@ COMMANDS: Final = {
     "od": ("od",),
     "twin": ("twin",),
     "bus": ("scan", "read", "write", "save", "restart", "record"),
+    "pdo": ("pdo",),
     "backup": ("backup",),
     "restore": ("restore",),
     "recordings": ("export", "recover"),

@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 from app.errors import (
     ConsentError,
+    DeviceBusyError,
     DeviceError,
     HubsideError,
     NoAnswerError,
     OvertakenError,
+    PdoBrokenError,
     RefusedError,
     RestoreOpenError,
     RestoreRefusedError,
@@ -103,6 +105,8 @@ def next_step(error: HubsideError) -> str | None:
     """Text key of what to do next."""
     for kind, key in (
         (UsageError, "usage"),
+        (DeviceBusyError, "device_busy"),
+        (PdoBrokenError, "pdo_broken"),
         (RestoreOpenError, "restore_open"),
         (RestoreRefusedError, "restore_refused"),
         (ConsentError, "consent"),

@@ -56,6 +56,14 @@ class Access(Enum):
         return self in (Access.RW, Access.WO)
 
 
+class PdoWay(Enum):
+    """Which way an object may go in PDOs, where its EDS says more than that it may (CiA 306: rwr, rww)."""
+
+    BOTH = "rw"
+    TRANSMIT = "rwr"
+    RECEIVE = "rww"
+
+
 class RestoreClass(Enum):
     """Where a value of a parameter set may be written back to."""
 
@@ -248,7 +256,18 @@ class Entry:
     motion: bool = False
     counts: bool = False
     overwritten_by: Address | None = None
+    pdo_way: PdoWay = PdoWay.BOTH
     line: int = 0
+
+    @property
+    def receivable(self) -> bool:
+        """True where a receive PDO may write it, if it may be mapped at all."""
+        return self.access.writable and self.pdo_way is not PdoWay.TRANSMIT
+
+    @property
+    def sendable(self) -> bool:
+        """True where a transmit PDO may carry it, if it may be mapped at all."""
+        return self.access.readable and self.pdo_way is not PdoWay.RECEIVE
 
     @property
     def is_parameter(self) -> bool:

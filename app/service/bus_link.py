@@ -110,16 +110,18 @@ class BusLink(BusFeed):
         return bool(self.driver.needs_consent)
 
     def send_pdo(self, node: int, address: Address, data: bytes) -> bool:
-        """Send ``data`` by the receive PDO of ``node`` that carries ``address`` and nothing else.
+        """Send ``data`` by the receive PDO of ``node`` that carries ``address`` and nothing else, and works at once.
 
-        False where it has to be written as well: the node is not operational, no such PDO is in force (nothing was
-        sent then), or an earlier write of ours to the object may be executed only now. Raises BusLostError.
+        False where it has to be written as well: the node is not operational, no such PDO is in force or the only ones
+        wait for a SYNC (nothing was sent then), or an earlier write of ours to the object may be executed only now.
+        Raises BusLostError.
         """
         view = self._live.node(self.name, node)
         if view is None or view.state is not NmtState.OPERATIONAL or view.silent:
             return False
         for route in self.pdos(node):
             entries = route.mapping.entries
-            if route.source is Source.PDO_RX and len(entries) == 1 and entries[0] == (address, 8 * len(data)):
+            carries = len(entries) == 1 and entries[0] == (address, 8 * len(data))
+            if route.source is Source.PDO_RX and carries and route.at_once:
                 return bool(self.driver.command_raw(node, address, Can(route.can_id, data, route.extended)))
         return False

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from app.drivers.contract import Driver
@@ -47,11 +47,19 @@ class Target:
         return decode(entry, view.reading.data)
 
     async def pass_gate(self, driver: Driver) -> None:
-        """Raises RestoreOpenError where a restore of the device is not finished.
+        """Raises RestoreOpenError where a restore of the device is not finished, DeviceBusyError where it is in use.
 
         Its identity is read for that where nobody has seen it yet. Raises NoAnswerError, BusLostError, ConsentError.
         """
         await self.gate.check(self.device, lambda: self._identity(driver))
+
+    async def require_no_restore(self, driver: Driver) -> None:
+        """As ``pass_gate``, for who has claimed the device."""
+        await self.gate.check_restores(self.device, lambda: self._identity(driver))
+
+    def past_gate(self) -> Target:
+        """The same device for who has it for himself: nothing keeps him from ending what he began."""
+        return replace(self, gate=OPEN)
 
     async def _identity(self, driver: Driver) -> Identity:
         """What the device says of itself. Raises NoAnswerError."""

@@ -1,7 +1,8 @@
 """The gate before every write, save and restart: shut for a station whose restore is not finished.
 
 Its values may be half old, half new then. A device is known by the name of its station, and under any other name, or on
-any other adapter, by what it says of itself. STOP, FEATHER and reading never come through here.
+any other adapter, by what it says of itself. Shut too while somebody has the device for himself (``service.claims``):
+who has it writes past the gate. STOP, FEATHER and reading never come through here.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from app.errors import RestoreOpenError, UsageError
 from app.model.sets import Identity
 from app.model.site import Device
 from app.model.station import station_slug
+from app.service.claims import Claims
 
 BARE_TURBINE: Final = "bus"
 """Slug of a turbine that no site file names: nothing but the adapter and the node says which device it is."""
@@ -74,17 +76,23 @@ class Blocks:
 
 
 class Gate:
-    """The gate of one connection. ``adapters`` by name of the bus."""
+    """The gate of one connection. ``adapters`` by name of the bus; ``claims``: who is at work at which device."""
 
     def __init__(self, adapters: Mapping[str, str], blocks: Blocks) -> None:
         self._adapters = {name: adapter_of(connection) for name, connection in adapters.items()}
         self.blocks = blocks
+        self.claims = Claims()
 
     async def check(self, device: Device, ask: Callable[[], Awaitable[Identity]]) -> None:
-        """Raises RestoreOpenError where a restore of the device is open. ``ask`` reads what it says of itself.
+        """Raises RestoreOpenError, DeviceBusyError. ``ask`` reads what the device says of itself.
 
         It is asked only where some restore is open and no name decides.
         """
+        await self.check_restores(device, ask)
+        self.claims.require_free(device.slug)  # at last: what is asked takes its time
+
+    async def check_restores(self, device: Device, ask: Callable[[], Awaitable[Identity]]) -> None:
+        """As ``check``, for who has the device: raises RestoreOpenError where a restore of it is open."""
         blocks, station = self.blocks.now, station_slug(device.slug)
         for block in blocks:
             if block.names(station):

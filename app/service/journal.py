@@ -190,6 +190,11 @@ class Journal:
         self._person = person
         self._pages = pages or _Pages()
 
+    @property
+    def person(self) -> str:
+        """Whose name it bears."""
+        return self._person
+
     def by(self, person: str) -> Journal:
         """The same journal, written by ``person``."""
         return Journal(self._stamp, person, self._pages)

@@ -1,6 +1,7 @@
 """STOP and FEATHER: to every axis of the live connection, on the shortest path there is.
 
-Where the node is operational and an RPDO carries the controlword alone, one frame does it. Otherwise our running
+Where the node is operational and an event-driven RPDO carries the controlword alone, one frame does it; an RPDO that
+waits for a SYNC or has an inhibit time is none for this, nor is one of which that is not known. Otherwise our running
 transfer to that node is aborted and 6040h is written by SDO, ahead of everything that waits. A write of 6040h that was
 asked for before and has not left yet does not leave any more; after one that has left the command goes by SDO too, for
 a device works these in their order; and so it does where the axis does not obey a frame within 30 ms. No lock, lease,
@@ -103,7 +104,7 @@ async def _command(axis: Axis, command: Command, now_ns: Callable[[], int]) -> A
 
 
 async def _by_sdo_too(driver: Driver, target: Target, command: Command, data: bytes, mark: int) -> bool:
-    """The axis does not obey, or not yet: a PDO may be switched off in the device, or wait for a SYNC that never comes.
+    """The axis does not obey, or not yet: somebody else may have switched the PDO off, or its frame was lost.
 
     Raises OvertakenError where a newer command came meanwhile: this one must not come after it.
     """

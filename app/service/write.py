@@ -16,7 +16,7 @@ from app.errors import (
 )
 from app.model.address import Address
 from app.model.checks import Allow, check_write
-from app.model.datatypes import Raw
+from app.model.datatypes import Raw, encode_raw
 from app.model.description import Entry, Verify
 from app.model.values import depends_on, parse, show
 from app.service.devices import Target, decode
@@ -95,8 +95,21 @@ async def write_raw(
     except HubsideError as error:
         journal.note(Kind.WRITE_FAILED, target.slug, **shown, reason=error.code, now=_shown(target, entry, raw))
         raise
-    journal.note(Kind.WRITTEN, target.slug, **shown, now=_shown(target, entry, raw), data=data.hex())
+    note_written(journal, target, entry, was, raw)
     return WriteResult(address, was, raw, read, read is not None or entry.verify is Verify.ACK, how)
+
+
+def note_written(journal: Journal, target: Target, entry: Entry, was: Raw | None, raw: Raw) -> None:
+    """For the journal: ``raw`` stands in the object now; ``was`` before it, None where that is not known."""
+    journal.note(
+        Kind.WRITTEN,
+        target.slug,
+        address=entry.address.short,
+        name=entry.title,
+        was=_shown(target, entry, was),
+        now=_shown(target, entry, raw),
+        data=encode_raw(entry.type, raw).hex(),
+    )
 
 
 async def _checked(driver: Driver, target: Target, entry: Entry, raw: Raw, allow: Allow) -> bytes:

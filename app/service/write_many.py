@@ -5,24 +5,37 @@ They are written in an order in which, after every single write, the stepwise ru
 
 from __future__ import annotations
 
-import asyncio
 from collections import Counter
-from collections.abc import Callable, Coroutine, Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any
 
 from app.drivers.contract import Driver
-from app.errors import BusLostError, HubsideError, OrderError, UsageError
+from app.errors import (
+    BusLostError,
+    ConflictError,
+    DeviceBusyError,
+    HubsideError,
+    NoAnswerError,
+    NotWrittenError,
+    OrderError,
+    RefusedError,
+    UnverifiedError,
+    UsageError,
+)
 from app.model.address import Address
 from app.model.checks import Allow, check_write
 from app.model.datatypes import Raw
-from app.model.station import Place
+from app.model.description import Verify
+from app.model.station import Place, station_slug
+from app.service.claims import Work
 from app.service.devices import Target
 from app.service.jobs import Job, JobRow, RowState
 from app.service.journal import Journal
 from app.service.save import save
-from app.service.write import write_raw
+from app.service.whole import whole
+from app.service.write import note_written, write_raw
 from app.service.write_order import Device, KnownDevices
 
 
@@ -85,23 +98,40 @@ def prepare(order: Order) -> list[JobRow]:
 async def write_many(job: Job, order: Order, journal: Journal, now_ns: Callable[[], int]) -> None:
     """Write the rows of ``prepare``; the job's rows tell how far it is, in the order in which they are written.
 
-    Every row is checked before the first is sent; a refused row is never sent, and with STOP none is then. A cancelled
-    job ends between two writes, never within one. A lost bus ends it as well. What failed stands in the rows.
+    Every row is checked before the first is sent; a refused row is never sent, and with STOP none is then. Nobody takes
+    one of the devices for himself meanwhile (``service.claims``); rows of a device that somebody has are refused. A
+    cancelled job ends between two writes, never within one. A lost bus ends it as well. After a write without a clear
+    end the value is read before the next one; where that fails, nothing more of its station is written: the order of
+    the rest would rest on what nobody knows. What failed stands in the rows.
     """
     rows = list(zip(order.changes, job.rows, strict=True))
-    known = await _known(rows, order)
-    rows = _in_order(rows, known)
-    job.rows[:] = [row for _, row in rows]
-    await _check_all(rows, order.allow)
-    job.done = sum(row.state is RowState.REFUSED for row in job.rows)
-    if job.done and order.on_failure is OnFailure.STOP:
-        return
-    if await _write_all(job, rows, order, known, journal):
-        return
-    for slug in dict.fromkeys(change.target.slug for change in order.changes):
-        if slug in order.save:
-            own = [(change, row) for change, row in rows if change.target.slug == slug]
-            await _whole(_save(own, journal, now_ns))
+    with ExitStack() as claims:
+        _claim(rows, journal.person, claims)
+        known = await _known(rows, order)
+        rows = _in_order(rows, known)
+        job.rows[:] = [row for _, row in rows]
+        await _check_all(rows, order.allow)
+        job.done = sum(row.state is RowState.REFUSED for row in job.rows)
+        if job.done and order.on_failure is OnFailure.STOP:
+            return
+        unclear = await _write_all(job, rows, order, known, journal)
+        if unclear is None:
+            return
+        for slug in dict.fromkeys(change.target.slug for change in order.changes):
+            if slug in order.save and station_slug(slug) not in unclear:
+                own = [(change, row) for change, row in rows if change.target.slug == slug]
+                await whole(_save(own, journal, now_ns))
+
+
+def _claim(rows: Sequence[Row], person: str, claims: ExitStack) -> None:
+    """Keep everybody from taking the devices for himself; those that somebody has are not written."""
+    for slug in dict.fromkeys(change.target.slug for change, _ in rows):
+        own = [(change, row) for change, row in rows if change.target.slug == slug]
+        try:
+            claims.enter_context(own[0][0].target.gate.claims.held(Work.WRITES, person, (slug,)))
+        except DeviceBusyError as error:
+            for _, row in own:
+                row.state, row.error = RowState.REFUSED, error
 
 
 async def _known(rows: Sequence[Row], order: Order) -> KnownDevices:
@@ -129,22 +159,48 @@ def _in_order(rows: Sequence[Row], known: KnownDevices) -> list[Row]:
     return [by_place[place] for place in (*batch.places, *batch.unordered)]
 
 
-async def _write_all(job: Job, rows: Sequence[Row], order: Order, known: KnownDevices, journal: Journal) -> bool:
-    """Write what waits; True where nothing more is to be done. After a failure the rest is put in order anew."""
+async def _write_all(
+    job: Job, rows: Sequence[Row], order: Order, known: KnownDevices, journal: Journal
+) -> frozenset[str] | None:
+    """Write what waits. After a failure the rest is put in order anew.
+
+    Gives the stations of which something is not known any more; None where nothing more is to be done.
+    """
+    unclear: set[str] = set()
     waiting = [(change, row) for change, row in rows if row.state is RowState.WAITING]
     while waiting:
         change, row = waiting.pop(0)
-        await _whole(_write(change, row, order.allow, journal))
+        is_clear = await whole(_write_clearly(change, row, order.allow, known, journal))
         job.done += 1
-        if _ends(row, order.on_failure):
-            return True
-        if row.error is None:
-            known.put(change.place, change.raw)
-            continue
-        waiting = _in_order(waiting, known)
-        job.done += sum(one.state is RowState.REFUSED for _, one in waiting)
-        waiting = [(change, one) for change, one in waiting if one.state is RowState.WAITING]
-    return False
+        ends = _ends(row, order.on_failure)
+        if not is_clear:
+            station = station_slug(change.target.slug)
+            unclear.add(station)
+            _give_up(job, change, [one for one in waiting if ends or _is_of(one, station)])
+        if ends:
+            return None
+        if row.error is not None:
+            waiting = _in_order([one for one in waiting if one[1].state is RowState.WAITING], known)
+            job.done += sum(one.state is RowState.REFUSED for _, one in waiting)
+            waiting = [(change, one) for change, one in waiting if one.state is RowState.WAITING]
+    return frozenset(unclear)
+
+
+def _is_of(row: Row, station: str) -> bool:
+    return station_slug(row[0].target.slug) == station
+
+
+def _give_up(job: Job, after: Change, rows: Iterable[Row]) -> None:
+    """Say of each row why it is not written."""
+    for change, row in rows:
+        row.state = RowState.REFUSED
+        row.error = NotWrittenError(
+            address=change.address.short,
+            name=change.target.entry(change.address).title,
+            after=after.address.short,
+            after_device=after.target.slug,
+        )
+        job.done += 1
 
 
 async def _check_all(rows: Sequence[Row], allow: Allow) -> None:
@@ -168,10 +224,33 @@ async def _check_all(rows: Sequence[Row], allow: Allow) -> None:
 
 
 def _ends(row: JobRow, on_failure: OnFailure) -> bool:
-    """True where nothing more is to be written: each further row would wait in vain on a bus that is gone."""
+    """True where nothing more is to be written at all: a person wants it so, or the bus is gone."""
     if row.error is None:
         return False
     return on_failure is OnFailure.STOP or isinstance(row.error, BusLostError)
+
+
+async def _write_clearly(change: Change, row: JobRow, allow: Allow, known: KnownDevices, journal: Journal) -> bool:
+    """Write, and have ``known`` know what the object holds then; where the write failed, by reading it.
+
+    False where its outcome is not known, and cannot be read.
+    """
+    await _write(change, row, allow, journal)
+    if row.error is None:
+        known.put(change.place, change.raw)
+        return True
+    if isinstance(row.error, BusLostError):
+        return False  # whatever comes back behind it may have started anew: nobody goes on from there by himself
+    unclear = isinstance(row.error, (NoAnswerError, UnverifiedError))
+    if not unclear and isinstance(row.error, RefusedError) and not isinstance(row.error, ConflictError):
+        return True  # nothing was sent
+    was = known.raw(change.place)
+    found = await known.look(change.driver, change.place)
+    entry = change.target.entry(change.address)
+    if unclear and found == change.raw and entry.verify is Verify.EQUAL:
+        row.state, row.error, row.was, row.read = RowState.VERIFIED, None, was, found
+        note_written(journal, change.target, entry, was, change.raw)
+    return found is not None or not unclear
 
 
 async def _write(change: Change, row: JobRow, allow: Allow, journal: Journal) -> None:
@@ -209,13 +288,3 @@ async def _save(rows: Sequence[Row], journal: Journal, now_ns: Callable[[], int]
         return
     for row in kept:
         row.state = RowState.SAVED
-
-
-async def _whole(work: Coroutine[Any, Any, None]) -> None:
-    """Run to its end, which every time-out of a driver brings about, even where the job is cancelled meanwhile."""
-    task = asyncio.ensure_future(work)
-    try:
-        await asyncio.shield(task)
-    except asyncio.CancelledError:
-        await asyncio.wait([task])
-        raise

@@ -35,6 +35,20 @@ class KnownDevices:
             found.update(dict.fromkeys(place for place in looked_at(station, own) if self._can_be_read(place)))
         return tuple(found)
 
+    async def look(self, driver: Driver, place: Place) -> Raw | None:
+        """What the object holds, read now; None where the device does not tell: then nobody knows it."""
+        target, address = self._targets[place.slug], place.address
+        entry = target.entry(address)
+        self._values[place.slug].pop(address, None)
+        if not entry.access.readable:
+            return None
+        try:
+            raw = decode(entry, await driver.read(target.node, address, entry.timeout_s))
+        except HubsideError:
+            return None
+        self.put(place, raw)
+        return raw
+
     async def read(self, places: Sequence[Place], drivers: Mapping[str, Driver]) -> None:
         """Read what is not known yet. What a device does not tell stays unknown; who writes to it meets the cause."""
         for slug in dict.fromkeys(place.slug for place in places):
@@ -51,6 +65,10 @@ class KnownDevices:
     def order(self, wanted: Mapping[Place, Raw]) -> Batch:
         """The order of these writes by what is known now."""
         return batch_order(self._devices(), wanted, allow=self._allow, accepted=self._accepted)
+
+    def raw(self, place: Place) -> Raw | None:
+        """What the object held when that was known last."""
+        return self._values[place.slug].get(place.address)
 
     def put(self, place: Place, raw: Raw) -> None:
         """The object holds this value now."""

@@ -11,6 +11,7 @@ from typing import Any, Final, NamedTuple
 
 from app.model.address import Address, parse_address
 from app.model.description import Description
+from app.model.pdo.setup import EVENT_TYPES, SUB_COB_ID, SUB_INHIBIT, SUB_TYPE
 from app.wire import pdo
 from app.wire.records import Source
 from app.wire.stored import covers
@@ -28,13 +29,18 @@ EMCY_COB_ID: Final = 0x1014
 
 
 class PdoRoute(NamedTuple):
-    """A PDO that exists: its identifier, what it carries, which way, and its number from 1 on."""
+    """A PDO that exists: its identifier, what it carries, which way, and its number from 1 on.
+
+    ``at_once``: it is event-driven (type 254 or 255, CiA 301, 7.5.2.35) and no inhibit time holds it back, as far as is
+    known for sure. Data of another RPDO take effect at the next SYNC, if there is one; this one's when they come.
+    """
 
     can_id: int
     extended: bool
     mapping: pdo.Mapping
     source: Source
     number: int
+    at_once: bool
 
 
 class Layout(NamedTuple):
@@ -68,20 +74,20 @@ class NodeConfiguration:
     def learn(self, address: Address, data: bytes, written: bool) -> bool:
         """Take a value that a device gave or acknowledged. True where routes may have changed."""
         raw = int.from_bytes(data, "little")
+        before = self._in_force(address)
         if written:
             self._written.add(address)
         elif address not in self._written:
             self._stored[address] = raw
-        changed = self.get(address) != raw
         self._known[address] = raw
-        return changed
+        return self._in_force(address) != before
 
     def forget(self, address: Address) -> bool:
         """A write had no end that was seen: back to what is stored. True where routes may have changed."""
+        before = self._in_force(address)
         self._written.add(address)
-        before = self.get(address)
         self._known.pop(address, None)
-        return self.get(address) != before
+        return self._in_force(address) != before
 
     def save(self, command: Address) -> None:
         """'save' was acknowledged on ``command``."""
@@ -96,7 +102,7 @@ class NodeConfiguration:
 
     def boot_up(self) -> bool:
         """The node has started anew. True where routes may have changed."""
-        changed = self._known != self._stored
+        changed = self._known != self._stored or any(map(self._is_unsure, self._written))
         self._known = dict(self._stored)
         self._written.clear()
         return changed
@@ -105,6 +111,13 @@ class NodeConfiguration:
         """The raw value in force, else None."""
         known = self._known.get(address)
         return self._defaults.get(address) if known is None else known
+
+    def _in_force(self, address: Address) -> tuple[int | None, bool]:
+        return self.get(address), self._is_unsure(address)
+
+    def _is_unsure(self, address: Address) -> bool:
+        """A write to it had no end that was seen, and nobody has read it since."""
+        return address in self._written and address not in self._known
 
     def layout(self) -> Layout:
         """All identifiers and PDOs in force."""
@@ -118,7 +131,7 @@ class NodeConfiguration:
         """Every PDO that is valid and whose mapping is known."""
         for base, (mapping_base, source, predefined) in _BASES.items():
             for number in self._numbers(mapping_base):
-                cob_id = self.get(Address(base + number, 1))
+                cob_id = self.get(Address(base + number, SUB_COB_ID))
                 if cob_id is None and number < _PREDEFINED:
                     cob_id = predefined + 0x100 * number + self._node
                 mapping = self._mapping(mapping_base + number)
@@ -126,7 +139,14 @@ class NodeConfiguration:
                     continue
                 parameters = pdo.PdoParameters(cob_id)
                 if parameters.valid:
-                    yield PdoRoute(parameters.can_id, parameters.extended, mapping, source, number + 1)
+                    at_once = self._is_at_once(base + number, mapping_base + number)
+                    yield PdoRoute(parameters.can_id, parameters.extended, mapping, source, number + 1, at_once)
+
+    def _is_at_once(self, communication: int, mapping: int) -> bool:
+        if any(one.major in (communication, mapping) and self._is_unsure(one) for one in self._written):
+            return False
+        kind, inhibit = (self.get(Address(communication, sub)) for sub in (SUB_TYPE, SUB_INHIBIT))
+        return kind in EVENT_TYPES and not inhibit
 
     def _numbers(self, base: int) -> list[int]:
         known = {a.major - base for known in (self._defaults, self._known) for a in known}

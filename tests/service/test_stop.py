@@ -6,20 +6,22 @@ import asyncio
 
 import pytest
 
-from app.errors import OvertakenError
+from app.errors import NoAnswerError, OvertakenError
 from app.model.address import Address
 from app.model.checks import Allow
 from app.service.backup import read_devices
 from app.service.connection import Connection
+from app.service.pdo.look import seen_on
 from app.service.stop import Command, Path, command_all
 from app.service.write import write_raw
 from app.twins.line import Fault, delay, drop
-from app.wire.nmt import NmtCommand
+from app.wire.nmt import NmtCommand, NmtState
 from tests.e2e.test_interoperation import until
 from tests.service.conftest import MS, Served
 
 CONTROLWORD = Address(0x6040)
 ANGLE = Address(0x6064)
+RPDO1_TYPE = Address(0x1400, 2)
 
 
 async def enable(connection: Connection, node: int) -> None:
@@ -126,3 +128,63 @@ async def test_a_stop_by_pdo_is_not_undone_by_a_write_that_is_on_its_way(
     await asyncio.gather(enabling, return_exceptions=True)
     assert int.from_bytes(await driver.read(11, CONTROLWORD), "little") == Command.STOP.value
     assert await statusword(connection, 11) & 0x6F != 0x27
+
+
+async def start(connection: Connection, node: int) -> None:
+    """Have the node operational, and known to be."""
+    connection.buses["can0"].driver.nmt(NmtCommand.START, node)
+
+    def runs() -> bool:
+        view = connection.live.node("can0", node)
+        return view is not None and view.state is NmtState.OPERATIONAL
+
+    await until(runs)
+
+
+async def stop_at(connection: Connection, node: int) -> Path:
+    """STOP an enabled axis; by which way it went, which must have been one alone."""
+    await enable(connection, node)
+    sent = (0x200 + node, False)
+    before = seen_on(connection, "can0").latest_ns.get(sent)
+    outcomes = await command_all(connection.axes(), Command.STOP, connection.journal, connection.stamper)
+    (outcome,) = [one for one in outcomes if one.device == "wtg-07/blade-1/pmc"]
+    assert outcome.confirmed_t_ns is not None
+    assert await statusword(connection, node) & 0x6F != 0x27
+    by_pdo = seen_on(connection, "can0").latest_ns.get(sent) != before
+    assert by_pdo is (outcome.how is Path.RPDO)
+    return outcome.how
+
+
+@pytest.mark.parametrize("kind", [0, 1, 240, 252])
+async def test_a_pdo_that_waits_for_a_sync_is_no_way_for_a_stop(connection: Connection, kind: int) -> None:
+    """What comes by it takes effect only at a SYNC, and none is ever sent here: it goes by SDO, and at once."""
+    await start(connection, 11)
+    driver = connection.buses["can0"].driver
+    assert await stop_at(connection, 11) is Path.RPDO
+    await driver.write(11, RPDO1_TYPE, bytes((kind,)))
+    assert await stop_at(connection, 11) is Path.SDO
+    await driver.write(11, RPDO1_TYPE, bytes((254,)))
+    assert await stop_at(connection, 11) is Path.RPDO
+
+
+async def test_a_pdo_of_which_it_is_not_sure_when_it_works_is_no_way_for_a_stop(
+    connection: Connection, served: Served
+) -> None:
+    """The answer to the write of its transmission type is lost: it may wait for a SYNC now, until somebody reads it."""
+    await start(connection, 11)
+    driver = connection.buses["can0"].driver
+    lost = Fault(lambda can: can.can_id == 0x58B and can.data[1:4] == b"\x00\x14\x02", drop, times=None)
+    served.spoil(lost)
+    with pytest.raises(NoAnswerError):
+        await driver.write(11, RPDO1_TYPE, b"\x01")
+    served.thread.call_soon(lambda: served.line.withdraw(lost))
+    assert await stop_at(connection, 11) is Path.SDO
+    await driver.write(11, RPDO1_TYPE, b"\xff")
+    assert await stop_at(connection, 11) is Path.RPDO
+
+
+async def test_a_pdo_that_is_switched_off_is_no_way_for_a_stop(connection: Connection) -> None:
+    await start(connection, 11)
+    driver = connection.buses["can0"].driver
+    await driver.write(11, Address(0x1400, 1), (0x8000020B).to_bytes(4, "little"))
+    assert await stop_at(connection, 11) is Path.SDO

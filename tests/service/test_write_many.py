@@ -3,16 +3,27 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 
 import pytest
 
-from app.errors import ConflictError, HubsideError, LimitError, SdoAbortError, UsageError
+from app.errors import (
+    BusLostError,
+    ConflictError,
+    HubsideError,
+    LimitError,
+    NoAnswerError,
+    NotWrittenError,
+    OrderError,
+    SdoAbortError,
+    UsageError,
+)
 from app.model.address import Address
 from app.model.checks import Allow
 from app.service.connection import Connection
 from app.service.jobs import Job, Jobs, JobState, RowState
-from app.service.journal import Kind
+from app.service.journal import Entry, Kind
 from app.service.write_many import Change, OnFailure, Order, prepare, write_many
 from app.twins.line import Fault, delay, drop
 from app.wire.frame import Can
@@ -184,3 +195,127 @@ async def test_an_object_is_written_once_in_a_batch(connection: Connection) -> N
         prepare(order(twice))
     with pytest.raises(UsageError):
         prepare(order([]))
+
+
+SWITCH_ON, NOMINAL = Address(0x30FB, 8), Address(0x30FA, 1)
+
+
+def unheard(node: int, address: Address) -> Callable[[Can], bool]:
+    """From the acknowledge of a write on, all answers about the object are lost."""
+    mux, begun = address.major.to_bytes(2, "little") + bytes((address.minor,)), False
+
+    def matches(can: Can) -> bool:
+        nonlocal begun
+        own = can.can_id == 0x580 + node and can.data[1:4] == mux
+        begun = begun or (own and can.data[0] == 0x60)
+        return own and begun
+
+    return matches
+
+
+@contextmanager
+def until_a_write_fails(connection: Connection, served: Served, fault: Fault) -> Iterator[None]:
+    """The fault is on the wire until a write is told to have failed."""
+
+    def mend(entry: Entry) -> None:
+        if entry.kind is Kind.WRITE_FAILED:
+            served.thread.call_soon(lambda: served.line.withdraw(fault))
+
+    end = connection.journal.listen(mend)
+    served.spoil(fault)
+    try:
+        yield
+    finally:
+        end()
+
+
+async def lowered(connection: Connection) -> tuple[list[Change], int]:
+    """Two changes of which the second is allowed only after the first: the switch-on voltage, then the nominal one."""
+    target = connection.target(PMMS[0])
+    for address in (SWITCH_ON, NOMINAL, Address(0x30FB, 7), Address(0x30FA, 3)):
+        await connection.driver(target).read(target.node, address)
+    low = target.lookup(SWITCH_ON)
+    assert isinstance(low, int)
+    wanted = low - 1
+    return [change(connection, PMMS[0], SWITCH_ON, wanted - 1), change(connection, PMMS[0], NOMINAL, wanted)], wanted
+
+
+@pytest.mark.parametrize("on_failure", list(OnFailure))
+async def test_a_write_that_took_effect_unheard_counts_for_the_rest(
+    connection: Connection, served: Served, on_failure: OnFailure
+) -> None:
+    """Acknowledge and read-back are lost; read again, the object holds what was sent, and the next may rest on it."""
+    changes, wanted = await lowered(connection)
+    with until_a_write_fails(connection, served, Fault(unheard(1, SWITCH_ON), drop, times=None)):
+        job = await run(connection, order(changes, on_failure=on_failure))
+    assert states(job) == [RowState.VERIFIED] * 2, errors(job)
+    assert (job.rows[0].read, job.rows[1].read) == (wanted - 1, wanted)
+    kinds = [entry.kind for entry in connection.journal.latest() if entry.device == PMMS[0]]
+    assert (kinds.count(Kind.WRITE_FAILED), kinds.count(Kind.WRITTEN)) == (1, 2)
+
+
+async def test_a_write_that_never_arrived_is_a_failure_once_its_object_is_read(
+    connection: Connection, served: Served
+) -> None:
+    changes, wanted = await lowered(connection)
+    begun = False
+
+    def from_its_request_on(can: Can) -> bool:
+        nonlocal begun
+        own = can.can_id == 0x601 and can.data[1:4] == b"\xfb\x30\x08"
+        begun = begun or (own and can.data[0] >> 5 == 1)
+        return own and begun
+
+    with until_a_write_fails(connection, served, Fault(from_its_request_on, drop, times=None)):
+        job = await run(connection, order(changes, on_failure=OnFailure.GO_ON))
+    assert [row.address for row in job.rows] == ["30FB:08", "30FA:01"]
+    assert errors(job)[0] is NoAnswerError and errors(job)[1] in (OrderError, LimitError)
+    target = connection.target(PMMS[0])
+    assert await connection.driver(target).read(target.node, SWITCH_ON) == (wanted + 1).to_bytes(2, "little")
+
+
+@pytest.mark.parametrize("on_failure", list(OnFailure))
+async def test_where_nobody_knows_what_a_write_left_the_rest_is_not_written_and_says_why(
+    connection: Connection, served: Served, on_failure: OnFailure
+) -> None:
+    """The device is deaf from its first write on; with go-on the blade beside it is written and saved all the same."""
+    rows = [
+        change(connection, PMMS[0], LIMIT, 490),
+        change(connection, PMMS[0], NOMINAL, 570),
+        change(connection, PMC, Address(0x6065), 150),
+        change(connection, PMMS[1], LIMIT, 490),
+    ]
+    served.spoil(Fault(unheard(1, LIMIT), drop, times=None))
+    job = await run(connection, order(rows, save=True, on_failure=on_failure))
+    assert job.state is JobState.DONE and job.done == len(job.rows)
+    found = {(row.device, row.address): (row.state, row.error) for row in job.rows}
+    state, error = found[PMMS[0], "3110:01"]
+    assert state is RowState.REFUSED and isinstance(error, NoAnswerError)
+    left = [(PMMS[0], "30FA:01"), (PMC, "6065")]
+    if on_failure is OnFailure.STOP:
+        left.append((PMMS[1], "3110:01"))
+    else:
+        assert found[PMMS[1], "3110:01"] == (RowState.SAVED, None)
+    for place in left:
+        state, error = found[place]
+        assert state is RowState.REFUSED and isinstance(error, NotWrittenError), place
+        assert (error.details["after"], error.details["after_device"]) == ("3110:01", PMMS[0])
+        assert error.details["address"] == place[1]
+    written = {entry.device for entry in connection.journal.latest() if entry.kind in (Kind.WRITTEN, Kind.SAVED)}
+    assert written == ({PMMS[1]} if on_failure is OnFailure.GO_ON else set())
+
+
+async def test_a_lost_link_ends_the_batch_and_each_row_says_what_became_of_it(
+    connection: Connection, served: Served
+) -> None:
+    rows = [change(connection, slug, LIMIT, 490) for slug in PMMS]
+
+    def cut(_can: Can) -> Sequence[tuple[int, Can]]:
+        served.cut()
+        return ()
+
+    served.spoil(Fault(lambda can: can.can_id == 0x601 and can.data[0] >> 5 == 1, cut))
+    job = await run(connection, order(rows, save=True, on_failure=OnFailure.GO_ON))
+    assert states(job) == [RowState.REFUSED] * 3
+    assert errors(job) == [BusLostError, NotWrittenError, NotWrittenError]
+    assert job.done == 3

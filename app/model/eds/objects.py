@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 
 from app.model.address import Address
 from app.model.datatypes import DataType, Raw
-from app.model.description import Access, Entry, Kind, Limit
+from app.model.description import Access, Entry, Kind, Limit, PdoWay
 from app.model.eds.compact_pdo import implicit_pdos
 from app.model.eds.ini import Ini, Section, Value, Warnings, shorten
 from app.model.eds.numbers import Parsed, bare, parse_int, parse_value
@@ -54,6 +54,12 @@ _ACCESS: Final = {
     "const": Access.CONST,
 }
 _TYPES: Final = {data_type.value: data_type for data_type in DataType}
+
+
+def _pdo_way(section: Section) -> PdoWay:
+    value = section.get("AccessType")
+    text = "" if value is None else bare(value.text).lower()
+    return next((way for way in PdoWay if way.value == text), PdoWay.BOTH)
 
 
 @dataclass(frozen=True, slots=True)
@@ -210,6 +216,7 @@ class ObjectReader:
             minimum=self._limit(section, "LowLimit", data_type),
             maximum=self._limit(section, "HighLimit", data_type),
             node_id=default is not None and default.node_id,
+            pdo_way=_pdo_way(section),
             line=section.line,
         )
         value = section.get("ParameterValue")

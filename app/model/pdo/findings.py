@@ -13,7 +13,7 @@ from typing import Final
 
 from app.model.address import Address
 from app.model.datatypes import DataType
-from app.model.description import Access, Description
+from app.model.description import Access, Description, Entry, PdoWay
 from app.model.pdo.identifiers import Taken, Use, is_restricted, taken_by_pdos
 from app.model.pdo.objects import MAX_DUMMY_INDEX
 from app.model.pdo.setup import (
@@ -83,6 +83,8 @@ class Code(Enum):
     COB_ID_RANGE = "cob_id_range"
     COB_ID_TAKEN = "cob_id_taken"
     COB_ID_LINKED = "cob_id_linked"
+    COB_ID_SEEN = "cob_id_seen"
+    COMMANDS_OTHER = "commands_other"
     EXTENDED = "extended"
     TYPE_RESERVED = "type_reserved"
     REMOTE_ONLY = "remote_only"
@@ -103,7 +105,7 @@ _ERRORS: Final = frozenset(
         *(Code.NOT_MAPPABLE, Code.NOT_WRITABLE, Code.NOT_READABLE, Code.UNKNOWN_OBJECT, Code.DUMMY_IN_TPDO),
         *(Code.WRONG_LENGTH, Code.EMPTY_ENTRY, Code.TOO_MANY_BITS, Code.TOO_MANY_OBJECTS, Code.NO_OBJECT),
         *(Code.RESTRICTED, Code.COB_ID_RANGE, Code.COB_ID_TAKEN, Code.TYPE_RESERVED, Code.REMOTE_FORBIDDEN),
-        *(Code.SYNC_START_RANGE, Code.NO_PARAMETER, Code.STOP_PATH, Code.STATUS_PATH),
+        *(Code.SYNC_START_RANGE, Code.NO_PARAMETER, Code.STOP_PATH, Code.STATUS_PATH, Code.COMMANDS_OTHER),
     }
 )
 _NOTES: Final = frozenset({Code.NO_EVENT_TIMER, Code.TIMER_UNUSED})
@@ -130,11 +132,12 @@ class Finding:
 
 
 def is_stop_path(setup: PdoSetup) -> bool:
-    """True for a receive PDO by which STOP goes: the controlword alone, used as soon as it comes."""
+    """True for a receive PDO by which STOP goes: the controlword alone, used as soon as it comes, however often."""
     return (
         setup.id.direction is Direction.RECEIVE
         and setup.enabled
         and setup.on_event
+        and not setup.parameters.inhibit_100us
         and [(one.address, one.bits) for one in setup.mapped] == [(CONTROLWORD, _WORD_BITS)]
     )
 
@@ -160,7 +163,8 @@ def find(
             continue
         found += _mapping(description, place, setup)
         own = taken_by_pdos("", [other for other in after.values() if other.id != setup.id])
-        found += _cob_id(setup, others, own)
+        standing = place.id not in changed  # how a turbine shares its commands is not for an edit of another PDO to say
+        found += (one for one in _cob_id(setup, others, own) if not (standing and one.code is Code.COMMANDS_OTHER))
         found += _timing(place, setup)
         if setup.enabled and setup.id.direction is Direction.TRANSMIT:
             found += _triggers(description, setup)
@@ -211,12 +215,16 @@ def _entry(description: Description, pdo: PdoId, number: int, one: Mapped) -> It
         expected = entry.type.bits
         if not entry.pdo:
             yield finding(Code.NOT_MAPPABLE)
-        elif receives and not entry.access.writable:
-            yield finding(Code.NOT_WRITABLE, access=entry.access.value)
-        elif not receives and not entry.access.readable:
-            yield finding(Code.NOT_READABLE, access=entry.access.value)
+        elif receives and not entry.receivable:
+            yield finding(Code.NOT_WRITABLE, access=_access_text(entry))
+        elif not receives and not entry.sendable:
+            yield finding(Code.NOT_READABLE, access=_access_text(entry))
     if one.bits != expected:
         yield finding(Code.WRONG_LENGTH, bits=one.bits, expected=expected or 0)
+
+
+def _access_text(entry: Entry) -> str:
+    return entry.access.value if entry.pdo_way is PdoWay.BOTH else entry.pdo_way.value
 
 
 # -- its identifier -------------------------------------------------------------
@@ -237,10 +245,15 @@ def _cob_id(setup: PdoSetup, others: Sequence[Taken], own: Sequence[Taken]) -> I
     for taken in (*own, *others):
         if (taken.can_id, taken.extended) != (parameters.can_id, parameters.extended):
             continue
+        if taken.use is Use.SEEN and pdo.direction is Direction.RECEIVE:
+            continue  # it takes what somebody sends
         linked = taken not in own and _is_link(pdo.direction, taken.use)
-        code = Code.COB_ID_LINKED if linked else Code.COB_ID_TAKEN
+        code = _CODE_OF.get(taken.use, Code.COB_ID_LINKED if linked else Code.COB_ID_TAKEN)
         use = taken.use.value.upper() + (str(taken.number) if taken.number else "")
         yield Finding(code, pdo, Part.COB_ID, None, {**shown, "use": use, "by": taken.device or ""})
+
+
+_CODE_OF: Final = {Use.SEEN: Code.COB_ID_SEEN, Use.COMMANDS: Code.COMMANDS_OTHER}
 
 
 def _is_link(direction: Direction, use: Use) -> bool:

@@ -25,13 +25,20 @@ EMCY: Final = 0x080
 
 
 class Use(Enum):
-    """What an identifier is for; the value is the end of its text key ``page.pdo.use.…``."""
+    """What an identifier is for.
+
+    ``COMMANDS``: an RPDO that carries the controlword of an axis: who shared it would obey or command that axis.
+    ``SEEN``: frames of it are on the bus now, and nobody here knows whose.
+    """
 
     SYNC = "sync"
     TIME = "time"
     EMCY = "emcy"
     RPDO = "rpdo"
     TPDO = "tpdo"
+    SDO = "sdo"
+    COMMANDS = "commands"
+    SEEN = "seen"
 
 
 class Taken(NamedTuple):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from contextlib import suppress
+from contextlib import AbstractContextManager, ExitStack, suppress
 from dataclasses import dataclass
 from typing import Final
 
@@ -24,6 +24,7 @@ from app.service.battery.objects import (
 )
 from app.service.battery.records import ChangeRecord, Figures, Noted, TestRecord, Verdict
 from app.service.battery.sequence import Sequence, figures
+from app.service.claims import Work
 from app.service.connection import Connection
 from app.service.devices import Target
 from app.service.journal import Journal, Kind
@@ -81,7 +82,7 @@ class BatteryDesk:
     async def test(self, target: Target, person: str, journal: Journal) -> Running:
         """Begin a test; it goes on by itself. Returned once the drive has begun it, or would not.
 
-        Raises BatteryConditionError, BatteryCommandError, BatteryArmedError, and what a write raises.
+        Raises BatteryConditionError, BatteryCommandError, BatteryArmedError, DeviceBusyError, and what a write raises.
         """
         slug = target.slug
         require_battery(target)
@@ -93,8 +94,11 @@ class BatteryDesk:
             driver = self._connection.driver(target)
             before = await figures(driver, target)
             sequence = Sequence(driver, target, journal)
+            claim = ExitStack()
+            claim.enter_context(self._claimed(target, person))
             journal.note(Kind.BATTERY_TEST_BEGUN, slug)
             task = asyncio.create_task(self._run(target, person, sequence, before, journal))
+            task.add_done_callback(lambda _task: claim.close())
             running = self._running[slug] = Running(person, self._connection.stamper(), before, sequence, task)
         finally:
             self._beginning.discard(slug)
@@ -110,6 +114,10 @@ class BatteryDesk:
         running = self._running.get(target.slug)
         if running is not None:
             running.sequence.cancel()
+
+    def _claimed(self, target: Target, person: str) -> AbstractContextManager[None]:
+        """Nobody takes the device for himself meanwhile: what was begun by a write is ended by one."""
+        return self._connection.gate.claims.held(Work.BATTERY, person, (target.slug,))
 
     async def _require(self, target: Target, only: frozenset[Condition] | None = None) -> None:
         for need in await self.needs(target):
@@ -155,7 +163,7 @@ class BatteryDesk:
     async def charge(self, target: Target, journal: Journal) -> None:
         """Start the charger by hand (bit 0 of 3040h), and let the bit fall again.
 
-        Raises BatteryConditionError, BatteryCommandError, and what a write raises.
+        Raises BatteryConditionError, BatteryCommandError, DeviceBusyError, and what a write raises.
         """
         await self._require(target, frozenset({Condition.ANSWERS, Condition.NO_TEST, Condition.NO_RESTORE}))
         driver = self._connection.driver(target)
@@ -164,10 +172,11 @@ class BatteryDesk:
         async def charges() -> bool:
             return bool(await read_number(driver, target, CHARGER_STATUS) & _CHARGER_ACTIVE)
 
-        try:
-            await edges.rise(Command.CHARGE, charges)
-        finally:
-            await edges.fall(Command.CHARGE)
+        with self._claimed(target, journal.person):
+            try:
+                await edges.rise(Command.CHARGE, charges)
+            finally:
+                await edges.fall(Command.CHARGE)
 
     # -- change ------------------------------------------------------------------------
 
@@ -186,7 +195,7 @@ class BatteryDesk:
     async def changed(self, target: Target, serials: str, remark: str, person: str, journal: Journal) -> ChangeRecord:
         """The new battery is in: set its counter to 0, save, keep a record.
 
-        Raises BatteryNotNotedError, BatteryConditionError, what ``reset_counter`` raises, StoreError.
+        Raises BatteryNotNotedError, BatteryConditionError, DeviceBusyError, what ``reset_counter`` raises, StoreError.
         """
         old = await self.archive.noted(target.slug)
         if old is None:
@@ -195,7 +204,8 @@ class BatteryDesk:
             target, frozenset({Condition.ANSWERS, Condition.NO_TEST, Condition.NOBODY_MOVES, Condition.NO_RESTORE})
         )
         driver, now_ns = self._connection.driver(target), self._connection.stamper
-        counter = await reset_counter(driver, target, journal, now_ns)
+        with self._claimed(target, person):
+            counter = await reset_counter(driver, target, journal, now_ns)
         record = ChangeRecord(
             id=self.archive.new_id(),
             device=target.slug,

@@ -100,11 +100,12 @@ class Control:
             raise OvertakenError(address=CONTROLWORD.short, node=self.target.node)
 
     def word(self, word: Word) -> None:
-        """Send a controlword. Raises OvertakenError, AxisStateError (not operational), BusLostError."""
+        """Send a controlword. Raises OvertakenError, AxisStateError (no PDO takes it at once), BusLostError."""
         self.require_own()
         self._sent = True
         if not self._send_counted(word):
-            raise AxisStateError(device=self.target.slug, state="not operational", wanted="operational")
+            state = "not operational, or no event-driven RPDO carries 6040h alone"
+            raise AxisStateError(device=self.target.slug, state=state, wanted="operational")
 
     async def halt(self) -> None:
         """Halt an axis that is enabled; any other one would be enabled by that word. Raises AxisStateError too."""

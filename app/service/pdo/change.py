@@ -1,7 +1,8 @@
 """One change of PDOs, carried out: verified writes in the order of CiA 301, or everything as it was before.
 
 Whatever fails or is cancelled on the way, what stood before is written back, in the same order, and proven by reading.
-Where that fails too the change stays open in the store, to be put back later.
+Where that fails too the change stays open in the store, to be put back later. Who begins one has claimed the device:
+its writes pass no gate, so that nothing which is begun meanwhile can keep them from their end.
 """
 
 from __future__ import annotations
@@ -82,7 +83,7 @@ def _why(error: Exception) -> str:
 
 @dataclass
 class Carrying:
-    """A change under way, of the PDOs that ``change`` names.
+    """A change under way, of the PDOs that ``change`` names; ``target`` passes no gate.
 
     ``open_as`` is kept while it runs, and what stays kept where everything fails; ``replaces`` was kept before it.
     ``undo``: it puts an earlier change back.

@@ -15,6 +15,7 @@ from app.errors import PdoBusyError, PdoChangedError, PdoNoUndoError, PdoRefused
 from app.model.pdo.findings import PATHS, Finding, Severity, find
 from app.model.pdo.setup import PdoId, PdoSetup, PdoSetups, places_of
 from app.model.pdo.writes import PdoWrite, changed_pdos
+from app.service.claims import Work
 from app.service.connection import Connection
 from app.service.devices import Target
 from app.service.jobs import Job, JobRow, Jobs
@@ -73,9 +74,12 @@ class UndoStand(Enum):
     UNKNOWN = "unknown"
 
 
-def preview(stage: Stage, target: Target, edits: Sequence[Edit]) -> Preview:
-    """What the edits would do, by what is known; nothing is sent. Raises PdoUnknownError, PdoChangedError."""
-    before = setups_of(target)
+def preview(stage: Stage, target: Target, edits: Sequence[Edit], before: PdoSetups | None = None) -> Preview:
+    """What the edits would do, by what is known, or from ``before``; nothing is sent.
+
+    Raises PdoUnknownError, PdoChangedError.
+    """
+    before = setups_of(target) if before is None else before
     after = _edited(target, before, edits)
     findings = find(target.description, places_of(target.description), before, after, taken_by_others(stage, target))
     return Preview(findings, planned(target, before, after), cost(stage, target, before, after))
@@ -103,8 +107,8 @@ class PdoDesk:
     async def apply(self, worker: Worker, target: Target, edits: Sequence[Edit]) -> Job:
         """Write the edits in a job of its own: all of them, or none.
 
-        Raises LeaseHeldError, PdoBusyError, RestoreOpenError, PdoChangedError, PdoRefusedError, UsageError, and what
-        reading raises; nothing was written then.
+        Raises LeaseHeldError, PdoBusyError, DeviceBusyError, RestoreOpenError, PdoChangedError, PdoRefusedError,
+        UsageError, and what reading raises; nothing was written then.
         """
 
         async def prepare() -> Carrying:
@@ -112,6 +116,7 @@ class PdoDesk:
             if kept is not None and kept.stand is Stand.OPEN:
                 # Its beginning is the only note of how the PDOs were set up: it is put back first.
                 raise PdoBusyError(device=target.slug, reason_key="page.pdo.busy.open")
+            await target.require_no_restore(worker.connection.driver(target))
             before = await self._read(worker, target)
             after = _edited(target, before, edits)
             self._require(worker, target, before, after, lambda _finding: True)
@@ -122,6 +127,7 @@ class PdoDesk:
     async def undo(self, worker: Worker, target: Target) -> Job:
         """Put the last change of the device back, in a job of its own.
 
+        One that did not come to its end can be put back while a restore is incomplete too: it is no part of that.
         Raises PdoNoUndoError, PdoChangedError where its PDOs hold something else since, and what ``apply`` raises.
         """
         change = self.kept.of(target.slug)
@@ -129,6 +135,8 @@ class PdoDesk:
             raise PdoNoUndoError(device=target.slug)
 
         async def prepare() -> Carrying:
+            if change.stand is not Stand.OPEN:
+                await target.require_no_restore(worker.connection.driver(target))
             before = await self._read(worker, target)
             after = with_changes(before, change.before.values())
             if change.stand is Stand.APPLIED:
@@ -143,6 +151,8 @@ class PdoDesk:
     async def _start(self, worker: Worker, target: Target, prepare: Callable[[], Awaitable[Carrying]]) -> Job:
         with ExitStack() as stack:
             stack.enter_context(worker.motion.kept_still(target.slug, worker.page))
+            claims = worker.connection.gate.claims
+            stack.enter_context(claims.held(Work.PDOS, worker.person, (target.slug,)))
             carrying = await prepare()
             held = stack.pop_all()
 
@@ -154,9 +164,7 @@ class PdoDesk:
         return worker.jobs.start("pdo", target.slug, work, rows)
 
     async def _read(self, worker: Worker, target: Target) -> dict[PdoId, PdoSetup]:
-        driver = worker.connection.driver(target)
-        await target.pass_gate(driver)
-        return await read_setups(driver, target)
+        return await read_setups(worker.connection.driver(target), target)
 
     def _require(
         self,
@@ -185,10 +193,10 @@ class PdoDesk:
         change = PdoChange(target.slug, worker.person, self._stamp(), Stand.OPEN, old, new)
         return Carrying(
             worker.connection.driver(target),
-            target,
+            target.past_gate(),
             planned(target, before, after),
             change,
-            change if undone is None else replace(undone, stand=Stand.OPEN),
+            change if undone is None else undone.opened(),
             self.kept.of(target.slug),
             self.kept,
             worker.journal,

@@ -37,6 +37,10 @@ class PdoChange:
         """The same, once all of it was verified."""
         return replace(self, stand=Stand.APPLIED)
 
+    def opened(self) -> PdoChange:
+        """The same, once it has begun."""
+        return replace(self, stand=Stand.OPEN)
+
 
 class Kept:
     """The last change by device. Kept in ``store``. For the event loop."""

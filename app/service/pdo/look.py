@@ -5,15 +5,17 @@ Sends nothing, and serves a recording as it serves the bench.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final
 
 from app.model.address import Address
 from app.model.datatypes import DataType
 from app.model.description import Description
-from app.model.pdo.identifiers import EMCY, SYNC, Taken, Use, bus_wide
-from app.model.pdo.load import PdoLoad, estimate, total
+from app.model.pdo.findings import CONTROLWORD
+from app.model.pdo.identifiers import EMCY, SYNC, Taken, Use, bus_wide, is_restricted
+from app.model.pdo.load import Basis, PdoLoad, estimate, total
+from app.model.pdo.objects import COB_INVALID
 from app.model.pdo.setup import PdoId, PdoSetup, PdoSetups, parse_setup, places_of
 from app.service.devices import Target
 from app.service.stage import Stage
@@ -69,9 +71,9 @@ def mappable(description: Description) -> list[Mappable]:
     """What may be mapped, by address."""
     dummies = [Mappable(Address(kind.value), kind.bits or 0, True, False) for kind in _DUMMIES]
     objects = [
-        Mappable(entry.address, entry.type.bits, entry.access.writable, entry.access.readable)
+        Mappable(entry.address, entry.type.bits, entry.receivable, entry.sendable)
         for entry in description
-        if entry.pdo and entry.type.bits and (entry.access.writable or entry.access.readable)
+        if entry.pdo and entry.type.bits and (entry.receivable or entry.sendable)
     ]
     return [*objects, *dummies]
 
@@ -97,25 +99,54 @@ def seen_on(stage: Stage, bus: str) -> Seen:
 
 
 def taken_by_others(stage: Stage, target: Target) -> list[Taken]:
-    """Identifiers that this bus uses beside the PDOs of ``target``: SYNC, TIME, emergencies, PDOs of other nodes."""
+    """Identifiers that this bus uses beside the PDOs of ``target``: services, PDOs of other nodes, unknown frames."""
     bus = target.device.bus
     found = bus_wide(_sync_ids(stage, bus))
     for other in _on_bus(stage, bus):
-        raw = other.lookup(_EMCY_COB_ID)
-        emcy = raw & 0x7FF if isinstance(raw, int) else EMCY + other.node
-        found.append(Taken(emcy, False, Use.EMCY, other.slug))
+        found += _services(other)
         if other.slug == target.slug:
             continue
         for route in stage.buses[bus].pdos(other.node):
-            use = Use.TPDO if route.source is Source.PDO_TX else Use.RPDO
+            receives = route.source is not Source.PDO_TX
+            use = Use.RPDO if receives else Use.TPDO
             found.append(Taken(route.can_id, route.extended, use, other.slug, route.number))
-    return found
+            if receives and any(address == CONTROLWORD for address, _bits in route.mapping.entries):
+                found.append(Taken(route.can_id, route.extended, Use.COMMANDS, other.slug, route.number))
+    return [*found, *_unknown_frames(stage, target, found)]
+
+
+def _services(target: Target) -> Iterator[Taken]:
+    """Emergencies, and SDO servers (CiA 301, 7.5.2.30) at other identifiers than those that no PDO may have anyway."""
+    emcy = target.lookup(_EMCY_COB_ID)
+    if not isinstance(emcy, int):
+        yield Taken(EMCY + target.node, False, Use.EMCY, target.slug)
+    elif not emcy & COB_INVALID:
+        yield Taken(emcy & 0x7FF, False, Use.EMCY, target.slug)
+    for entry in target.description:
+        if not 0x1200 <= entry.address.major < 0x1280 or entry.address.minor not in (1, 2):
+            continue
+        raw = target.lookup(entry.address)
+        if raw is None and isinstance(entry.default, int):
+            raw = entry.default + (target.node if entry.node_id else 0)
+        if isinstance(raw, int) and not raw & COB_INVALID and not is_restricted(raw & 0x7FF):
+            yield Taken(raw & 0x7FF, False, Use.SDO, target.slug)
+
+
+def _unknown_frames(stage: Stage, target: Target, known: Iterable[Taken]) -> Iterator[Taken]:
+    """What came in the last second and belongs to nobody that is known: a device beside those of the site, perhaps."""
+    bus = target.device.bus
+    own = {(route.can_id, route.extended) for route in stage.buses[bus].pdos(target.node)}
+    explained = own | {(one.can_id, one.extended) for one in known}
+    for (can_id, extended), per_second in seen_on(stage, bus).per_second.items():
+        if per_second and (can_id, extended) not in explained and (extended or not is_restricted(can_id)):
+            yield Taken(can_id, extended, Use.SEEN, None)
 
 
 def cost(stage: Stage, target: Target, before: PdoSetups, after: PdoSetups) -> Cost:
     """What the PDOs of all nodes of the target's bus cost now, and would with ``after`` in the target.
 
-    A PDO that stays as it is counts as it was measured, where its node is operational.
+    A PDO that stays as it is counts as it was measured, where its node is operational. Of those that change, only what
+    was measured is in the load of the bus now, and no more than that leaves it.
     """
     bus = target.device.bus
     seen, bitrate = seen_on(stage, bus), stage.buses[bus].bitrate
@@ -133,8 +164,11 @@ def cost(stage: Stage, target: Target, before: PdoSetups, after: PdoSetups) -> C
             else:
                 then[other.slug, pdo] = estimate(new, bitrate, seen.sync_hz, None)
     pdos_now, pdos_after = total(now.values()), total(then.values())
+    changed = [key for key in now if then[key] is not now[key]]
+    leaves = total(now[key] for key in changed if now[key].basis is Basis.MEASURED)
     bus_now = stage.buses[bus].bus_load(stage.stamper())
-    return Cost(now, then, bus_now, max(0.0, bus_now + pdos_after - pdos_now), pdos_now, pdos_after)
+    bus_after = max(0.0, bus_now - leaves) + total(then[key] for key in changed)
+    return Cost(now, then, bus_now, bus_after, pdos_now, pdos_after)
 
 
 def measured_hz(setup: PdoSetup, seen: Seen) -> float:

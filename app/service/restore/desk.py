@@ -7,7 +7,8 @@ import contextlib
 import json
 import logging
 import time
-from collections.abc import Callable, Coroutine, Mapping
+from collections.abc import Callable, Coroutine, Iterable, Mapping
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
@@ -27,9 +28,10 @@ from app.model.description import Description
 from app.model.description_file import load_builtin
 from app.model.set_record import SetRecord, Source
 from app.model.sets import Identity
+from app.service.claims import Work
 from app.service.connection import Connection
 from app.service.devices import Target
-from app.service.gate import OPEN, Blocks
+from app.service.gate import Blocks
 from app.service.journal import Journal, Kind
 from app.service.office.office import Office
 from app.service.records.files import SealedRecord, seal_record
@@ -146,7 +148,7 @@ class Desk:
         """Begin what was prepared just now; gives the id of the restore, which runs in the background.
 
         ``agreed``: hash of the plan that the person has looked at. Raises RestoreChangedError where it is another one,
-        RestoreRefusedError where something speaks against it, RestoreOpenError.
+        RestoreRefusedError where something speaks against it, RestoreOpenError, DeviceBusyError.
         """
         order = prepared.order
         if agreed is not None and agreed != prepared.hash:
@@ -159,9 +161,10 @@ class Desk:
             found = open_at(connection, prepared.targets, prepared.found)
             if found is not None:
                 raise RestoreOpenError(station=order.station, restore=found)
-            return await self._begin(connection, prepared)
+            with _claimed(connection, prepared.targets, order.person) as claim:
+                return await self._begin(connection, prepared, claim)
 
-    async def _begin(self, connection: Connection, prepared: Prepared) -> str:
+    async def _begin(self, connection: Connection, prepared: Prepared, claim: ExitStack) -> str:
         order = prepared.order
         restore_id = self._new_id()
         before = await self._keep(prepared.found, REASON_BEFORE, order.person, Source.UNDO)
@@ -176,7 +179,8 @@ class Desk:
         kept = Kept(row, tuple(values), ())
         transaction = self._transaction(connection, kept, order.person, prepared.targets, prepared.commands)
         transaction.found = prepared.found
-        await self._run(kept, transaction, transaction.forward(prepared.plan, order.confirm_s), order.person)
+        way = transaction.forward(prepared.plan, order.confirm_s)
+        await self._run(kept, transaction, way, order.person, claim.pop_all())
         return restore_id
 
     # -- decide -------------------------------------------------------------------------
@@ -195,7 +199,7 @@ class Desk:
     async def roll_back(self, connection: Connection | None, restore_id: str, person: str) -> None:
         """Back to the old values: at once where it is incomplete, else after the step that runs.
 
-        Raises RestoreUnknownError, RestoreStateError, UsageError where its station is not connected.
+        Raises RestoreUnknownError, RestoreStateError, UsageError where its station is not connected, DeviceBusyError.
         """
         commands = None if connection is None else commands_of(connection)
         transaction = self.at_work(restore_id)
@@ -204,15 +208,17 @@ class Desk:
             return
         await self._settle()
         async with self._starting:
-            kept, transaction = await self._take_on(connection, restore_id, person, Kind.RESTORE_TURNED_BACK, commands)
-            await self._run(kept, transaction, transaction.back(), person)
+            kind = Kind.RESTORE_TURNED_BACK
+            kept, transaction, claim = await self._take_on(connection, restore_id, person, kind, commands)
+            await self._run(kept, transaction, transaction.back(), person, claim)
 
     async def resume(self, connection: Connection | None, restore_id: str, person: str) -> None:
-        """On to the new values. Raises RestoreUnknownError, RestoreStateError, UsageError."""
+        """On to the new values. Raises RestoreUnknownError, RestoreStateError, UsageError, DeviceBusyError."""
         commands = None if connection is None else commands_of(connection)
         async with self._starting:
-            kept, transaction = await self._take_on(connection, restore_id, person, Kind.RESTORE_RESUMED, commands)
-            await self._run(kept, transaction, transaction.resume(), person)
+            kind = Kind.RESTORE_RESUMED
+            kept, transaction, claim = await self._take_on(connection, restore_id, person, kind, commands)
+            await self._run(kept, transaction, transaction.resume(), person, claim)
 
     async def give_up(self, restore_id: str, person: str, reason: str) -> None:
         """An expert closes one that can neither be resumed nor rolled back, as its device is gone: the gate opens.
@@ -233,7 +239,7 @@ class Desk:
 
     async def _take_on(
         self, connection: Connection | None, restore_id: str, person: str, kind: Kind, commands: Counts | None
-    ) -> tuple[Kept, Transaction]:
+    ) -> tuple[Kept, Transaction, ExitStack]:
         kept = await self.get(restore_id)
         if self.running is not None or kept.row.state is not RestoreState.INCOMPLETE:
             raise self._wrong_state(kept.row)
@@ -244,8 +250,9 @@ class Desk:
         if len(targets) != len(slugs):
             raise UsageError(reason=f"not all devices of the restore are there: {', '.join(sorted(slugs))}")
         require_same_places(connection, kept, targets)
+        claim = _claimed(connection, targets, person)
         self._journal.by(person).note(kind, None, station=kept.row.station, restore=restore_id)
-        return kept, self._transaction(connection, kept, person, targets, commands)
+        return kept, self._transaction(connection, kept, person, targets, commands), claim
 
     def _wrong_state(self, row: RestoreRow) -> RestoreStateError:
         return RestoreStateError(restore=row.id, station=row.station, state_key=row.state.text_key)
@@ -262,7 +269,7 @@ class Desk:
     ) -> Transaction:
         details = kept.details
         log = RestoreLog(self._store, kept, self._stamp)
-        ungated = {target.slug: replace(target, gate=OPEN) for target in targets}
+        ungated = {target.slug: target.past_gate() for target in targets}
         journal = self._journal.by(person)
         hands = Hands(connection, ungated, log, journal, details["expert"], self._timing, self._monotonic, commands)
         terms = Terms(
@@ -280,25 +287,33 @@ class Desk:
         )
         return Transaction(hands, log, terms)
 
-    async def _run(self, kept: Kept, transaction: Transaction, way: Coroutine[Any, Any, End], person: str) -> None:
-        task = asyncio.create_task(self._watched(kept.row, transaction, way, person))
+    async def _run(
+        self, kept: Kept, transaction: Transaction, way: Coroutine[Any, Any, End], person: str, claim: ExitStack
+    ) -> None:
+        """``claim`` on its devices is given back at its end."""
+        task = asyncio.create_task(self._watched(kept.row, transaction, way, person, claim))
         self.running = Running(kept.row.id, kept.row.station, transaction, task)
         await asyncio.sleep(0)  # it has begun: whatever ends it from now on is seen by itself
 
     async def _watched(
-        self, row: RestoreRow, transaction: Transaction, way: Coroutine[Any, Any, End], person: str
+        self,
+        row: RestoreRow,
+        transaction: Transaction,
+        way: Coroutine[Any, Any, End],
+        person: str,
+        claim: ExitStack,
     ) -> End:
         end = End.INCOMPLETE
         try:
             end = await way
             return end
         finally:
-            ending = asyncio.ensure_future(self._ended(row, transaction, end, person))
+            ending = asyncio.ensure_future(self._ended(row, transaction, end, person, claim))
             self._endings.add(ending)
             ending.add_done_callback(self._endings.discard)
             await asyncio.shield(ending)
 
-    async def _ended(self, row: RestoreRow, transaction: Transaction, end: End, person: str) -> None:
+    async def _ended(self, row: RestoreRow, transaction: Transaction, end: End, person: str, claim: ExitStack) -> None:
         """The gate opens only where the station holds the old values or the new ones."""
         if end is End.INCOMPLETE:
             self._open[row.id] = replace(row, state=RestoreState.INCOMPLETE)
@@ -307,6 +322,7 @@ class Desk:
         if transaction.broken is not None:
             self._broken[row.id] = transaction.broken
         self._shut()
+        claim.close()
         try:
             await self._keep_end(row, transaction, end, person)
         finally:
@@ -412,6 +428,17 @@ class Desk:
             return await self._office.library.put(own, source)
         except StoreError:
             return []
+
+
+def _claimed(connection: Connection, targets: Iterable[Target], person: str) -> ExitStack:
+    """A restore's claim on its devices, before the gate is shut and until it is worked on no more.
+
+    Raises DeviceBusyError.
+    """
+    stack = ExitStack()
+    slugs = [target.slug for target in targets]
+    stack.enter_context(connection.gate.claims.held(Work.RESTORE, person, slugs))
+    return stack
 
 
 _KIND_OF: Final[Mapping[End, Kind]] = {

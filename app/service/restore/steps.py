@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Callable, Coroutine, Iterable, Mapping
-from typing import Any, Final, TypeVar
+from collections.abc import Callable, Iterable, Mapping
+from typing import Final
 
 from app.drivers.contract import LinkState
 from app.errors import (
@@ -44,10 +44,10 @@ from app.service.restore.survey import (
 )
 from app.service.save import restart, save
 from app.service.stop import CONTROLWORD
+from app.service.whole import whole
 from app.service.write import write_raw
 from app.store.restore_rows import Direction, StepState
 
-T = TypeVar("T")
 DEVICE_TYPE: Final = Address(0x1000)
 SHUTDOWN: Final = 0x0106
 """Controlword (manual table 52)."""
@@ -399,13 +399,3 @@ def _state_after(error: HubsideError) -> StepState:
     """Whether it is known what became of a step that ended with ``error``."""
     open_ends = (NoAnswerError, UnverifiedError)
     return StepState.UNKNOWN if isinstance(error, open_ends) else StepState.FAILED
-
-
-async def whole(work: Coroutine[Any, Any, T]) -> T:
-    """Run to its end, which every time-out of a driver brings about, even where the task is cancelled meanwhile."""
-    task = asyncio.ensure_future(work)
-    try:
-        return await asyncio.shield(task)
-    except asyncio.CancelledError:
-        await asyncio.wait([task])
-        raise

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import pytest
 
-from app.model.description import Access
-from app.model.pdo.findings import Code, Finding, Part, Severity, find
+from app.model.description import Access, PdoWay
+from app.model.pdo.findings import Code, Finding, Part, Severity, find, is_stop_path
 from app.model.pdo.identifiers import Taken, Use, is_restricted
 from app.model.pdo.objects import PdoParameters
 from app.model.pdo.setup import Mapped, PdoId, PdoSetup
@@ -86,6 +86,21 @@ def test_an_object_that_can_only_be_written_is_not_sent() -> None:
     before = delivered()
     found = find(description, places(), before, {**before, TPDO2: tpdo2("6041/16")}, [])
     assert Code.NOT_READABLE in {one.code for one in found if one.pdo == TPDO2}
+
+
+@pytest.mark.parametrize(
+    ("way", "sent", "received"),
+    [(PdoWay.BOTH, True, True), (PdoWay.TRANSMIT, True, False), (PdoWay.RECEIVE, False, True)],
+)
+def test_an_object_goes_the_way_that_its_eds_allows(way: PdoWay, sent: bool, received: bool) -> None:
+    """CiA 306: rwr is read by PDO and rww written, though both are read and written by SDO."""
+    entry = pmc().entry(mapped("607A/32")[0].address)
+    description = replace(pmc(), entries={**pmc().entries, entry.address: replace(entry, pdo_way=way)})
+    before = delivered()
+    after = {**before, TPDO2: tpdo2("607A/32"), RPDO2: rpdo2("607A/32")}
+    found = {(one.code, one.pdo) for one in find(description, places(), before, after, [])}
+    assert ((Code.NOT_READABLE, TPDO2) not in found) is sent
+    assert ((Code.NOT_WRITABLE, RPDO2) not in found) is received
 
 
 def test_bits_of_a_receive_pdo_may_be_filled_up() -> None:
@@ -224,3 +239,27 @@ def test_a_node_that_had_no_path_for_stop_is_told_so_and_may_be_changed() -> Non
 def test_what_is_off_and_stays_as_it_is_harms_nobody() -> None:
     before = {**delivered(), TPDO3: PdoSetup(TPDO3, PdoParameters(0x80000001, 245), (Mapped(0),) * 9)}
     assert [one for one in find(pmc(), places(), before, before, []) if one.pdo == TPDO3] == []
+
+
+def test_the_commands_of_another_axis_are_neither_taken_nor_sent() -> None:
+    """What enables that axis would enable this one, or what this one sends would be its controlword."""
+    theirs = [Taken(0x293, False, Use.RPDO, OTHER, 1), Taken(0x293, False, Use.COMMANDS, OTHER, 1)]
+    for setup in (rpdo2(cob_id=0x293), tpdo2(cob_id=0x40000293)):
+        assert errors(setup, others=theirs) == [(Code.COMMANDS_OTHER, setup.id, Part.COB_ID, None)]
+    before = {**delivered(), RPDO2: rpdo2(cob_id=0x293)}
+    found = find(pmc(), places(), before, {**before, TPDO2: tpdo2()}, theirs)
+    assert [one for one in found if one.severity is Severity.ERROR] == [], "where it stands so, other PDOs may change"
+
+
+def test_frames_of_somebody_unknown_are_told_to_who_would_send_the_same() -> None:
+    seen = [Taken(0x291, False, Use.SEEN, None)]
+    assert Code.COB_ID_SEEN in codes(tpdo2(cob_id=0x40000291), others=seen)
+    assert Code.COB_ID_SEEN not in codes(rpdo2(cob_id=0x291), others=seen)
+    assert errors(tpdo2(cob_id=0x40000291), others=seen) == []
+
+
+def test_a_receive_pdo_with_an_inhibit_time_is_no_way_for_a_stop() -> None:
+    """A second STOP that came too soon after a command would be left out."""
+    held = changed(delivered()[RPDO1], inhibit_100us=100)
+    assert not is_stop_path(held)
+    assert is_stop_path(delivered()[RPDO1])

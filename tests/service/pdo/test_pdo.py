@@ -45,6 +45,7 @@ from app.wire.records import Source
 from tests.model.pdo.rig import RPDO1, RPDO2, TPDO1, TPDO2, TPDO3, changed, disabled, enabled
 from tests.service.conftest import Served
 from tests.service.pdo.rig import AXIS, DEADLINE_S, PAGE, Person, ended, with_cob_id
+from tests.service.restore.conftest import holding
 
 POSITION = Address(0x6064)
 
@@ -167,28 +168,46 @@ async def test_a_change_that_is_cancelled_is_put_back_whole(person: Person) -> N
     assert person.desk.kept.of(AXIS) is None
 
 
-async def test_what_could_not_be_put_back_stays_open_and_is_put_back_later(person: Person) -> None:
+async def test_what_failed_is_put_back_whatever_the_gate_says_meanwhile(person: Person) -> None:
     before = await person.setups()
     blocks, journal = person.connection.gate.blocks, person.connection.journal
 
     def shut(entry: Entry) -> None:
-        """From the failed write on nothing may be written any more."""
+        """From the failed write on nobody else may write any more."""
         if entry.kind is Kind.WRITE_FAILED:
             blocks.put([Block("r1", "wtg-07/blade-1", ())])
 
     end = journal.listen(shut)
     job = await person.apply(with_cob_id(changed(before[TPDO2], "6064/32", event_ms=20), 0x60012345))
     end()
+    assert job.state is JobState.FAILED and isinstance(job.error, PdoRolledBackError)
+    assert blocks.now, "the gate was shut before anything was put back"
+    assert await person.setups() == before
+    assert person.desk.kept.of(AXIS) is None
+
+
+async def test_what_could_not_be_put_back_stays_open_and_is_put_back_later(served: Served, person: Person) -> None:
+    before = await person.setups()
+    blocks, journal = person.connection.gate.blocks, person.connection.journal
+    deaf = Fault(lambda can: can.can_id == 0x600 + person.target.node, drop, times=None)
+
+    def cut_off(entry: Entry) -> None:
+        """From the failed write on the device hears nothing any more."""
+        if entry.kind is Kind.WRITE_FAILED:
+            served.spoil(deaf)
+
+    end = journal.listen(cut_off)
+    job = await person.apply(with_cob_id(changed(before[TPDO2], "6064/32", event_ms=20), 0x60012345))
+    end()
     assert job.state is JobState.FAILED and isinstance(job.error, PdoBrokenError)
-    assert job.error.details["again_key"] == "page.pdo.why.held"
+    assert job.error.details["again_key"] == "page.pdo.why.no_answer"
     assert Kind.PDO_BROKEN in [entry.kind for entry in journal.latest()]
     assert person.desk.undo_stand(person.target) is UndoStand.OPEN
+    served.thread.call_soon(lambda: served.line.withdraw(deaf))
     assert (await person.setups())[TPDO2].parameters.event_ms == 20
-    with pytest.raises(RestoreOpenError):
-        await person.undo()
-    blocks.put([])
     with pytest.raises(PdoBusyError):
         await person.begin(changed(before[TPDO2], "6064/32", event_ms=30))
+    blocks.put([Block("r1", "wtg-07/blade-1", ())])  # a restore of the station that is not finished is no obstacle
     undone = await person.undo()
     assert (undone.state, undone.error) == (JobState.DONE, None)
     assert await person.setups() == before
@@ -324,8 +343,54 @@ async def test_identifiers_of_the_whole_turbine_are_known(person: Person) -> Non
         if target.slug != AXIS:
             assert Taken(0x180 + target.node, False, Use.TPDO, target.slug, 1) in taken
             assert Taken(0x200 + target.node, False, Use.RPDO, target.slug, 1) in taken
+            commands = Taken(0x200 + target.node, False, Use.COMMANDS, target.slug, 1)
+            assert (commands in taken) is target.slug.endswith("/pmc")
     before = await person.setups()
     other = person.connection.target("wtg-07/blade-2/pmc").node
     with pytest.raises(PdoRefusedError) as refused:
         await person.begin(enabled(before[TPDO2], cob_id=0x40000180 + other))
     assert refused.value.details["by"] == "wtg-07/blade-2/pmc"
+    with pytest.raises(PdoRefusedError) as refused:
+        await person.begin(enabled(before[RPDO2], cob_id=0x200 + other))
+    assert refused.value.details["reason_key"] == "page.pdo.finding.commands_other"
+
+
+async def test_an_emergency_object_that_is_off_takes_no_identifier(served: Served, person: Person) -> None:
+    target, driver = person.target, person.connection.driver(person.target)
+    own, cell = Taken(0x80 + target.node, False, Use.EMCY, AXIS), served.turbine.devices[target.node].store.find(0x1014)
+    assert cell is not None and own in taken_by_others(person.connection, target)
+    end = holding(cell, 0x80000000 + own.can_id)  # the unit lets nobody write it
+    await driver.read(target.node, Address(0x1014))
+    async with asyncio.timeout(DEADLINE_S):
+        while own in taken_by_others(person.connection, target):  # noqa: ASYNC110  the live state has no event for it
+            await asyncio.sleep(0.01)
+    end()
+
+
+async def test_what_an_unknown_device_sends_is_seen_and_told(served: Served, person: Person) -> None:
+    stranger = 0x2F0
+    before = await person.setups()
+    network = canopen.Network()
+    network.connect(interface="socketcand", host="127.0.0.1", port=served.server.port, channel="can0")
+    sending = network.send_periodic(stranger, b"\x01\x02", 0.02)
+    try:
+        async with asyncio.timeout(DEADLINE_S):
+            unknown = Taken(stranger, False, Use.SEEN, None)
+            while unknown not in taken_by_others(person.connection, person.target):  # noqa: ASYNC110  no event for it
+                await asyncio.sleep(0.02)
+    finally:
+        sending.stop()  # type: ignore[no-untyped-call]
+        network.disconnect()
+    wanted = enabled(before[TPDO2], cob_id=0x40000000 + stranger)
+    found = preview(person.connection, person.target, [Edit(before[TPDO2], wanted)], before).findings
+    assert Code.COB_ID_SEEN in {one.code for one in found if one.pdo == TPDO2}
+
+
+async def test_what_is_sent_by_nobody_yet_leaves_no_load_when_it_ends(person: Person) -> None:
+    """The node is not operational: its PDOs cost nothing now, and nothing less once one of them is off."""
+    before = await person.setups()
+    await person.apply(enabled(before[TPDO2], event_ms=10))
+    now = await person.setups()
+    found = preview(person.connection, person.target, [Edit(now[TPDO2], disabled(now[TPDO2]))], now).cost
+    assert found.pdos_after < found.pdos_now
+    assert found.bus_after == found.bus_now

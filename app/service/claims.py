@@ -1,0 +1,75 @@
+"""Who is at work at which device: what must come to its end whole excludes what would cut it in two.
+
+A change of PDOs and a restore want a device for themselves: neither begins while anything else is under way there, and
+while one is, nothing else is written, saved or restarted (``service.gate``). A batch of writes and a battery test only
+keep these two away. STOP, FEATHER and reading never ask. Claims are taken and given back in the event loop without
+waiting in between, so that of two that begin at once one is refused before it has sent anything.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from enum import Enum
+
+from app.errors import DeviceBusyError
+
+
+class Work(Enum):
+    """What is under way; the value is the end of its text key ``device_work.…``."""
+
+    PDOS = "pdos"
+    RESTORE = "restore"
+    WRITES = "writes"
+    BATTERY = "battery"
+
+    @property
+    def alone(self) -> bool:
+        """True for what suffers nothing else at its devices."""
+        return self in (Work.PDOS, Work.RESTORE)
+
+    @property
+    def text_key(self) -> str:
+        """Key of its name in the catalogue."""
+        return f"device_work.{self.value}"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Claim:
+    """Somebody's work at some devices (slugs)."""
+
+    work: Work
+    person: str
+    devices: frozenset[str]
+
+    def refusal(self, device: str) -> DeviceBusyError:
+        """What keeps others from the device."""
+        return DeviceBusyError(device=device, work_key=self.work.text_key, person=self.person)
+
+
+class Claims:
+    """The claims on the devices of one connection. Belongs to the event loop."""
+
+    def __init__(self) -> None:
+        self._now: list[Claim] = []
+
+    @contextmanager
+    def held(self, work: Work, person: str, devices: Iterable[str]) -> Iterator[None]:
+        """Have all these devices for ``work`` meanwhile. Raises DeviceBusyError; then none is claimed."""
+        claim = Claim(work, person, frozenset(devices))
+        for other in self._now:
+            if work.alone or other.work.alone:
+                for device in sorted(claim.devices & other.devices):
+                    raise other.refusal(device)
+        self._now.append(claim)
+        try:
+            yield
+        finally:
+            self._now.remove(claim)
+
+    def require_free(self, device: str) -> None:
+        """Raises DeviceBusyError where somebody has the device for himself."""
+        for claim in self._now:
+            if claim.work.alone and device in claim.devices:
+                raise claim.refusal(device)
