@@ -136,6 +136,12 @@ class HubsideError(Exception):
         return f"error.{self.code}"
 
 
+def because(error: HubsideError) -> dict[str, Any]:
+    """``error`` as the reason of another one: what it tells, and the key of its text as ``reason_key``."""
+    details = dict(error.details)
+    return {**details, "reason_key": details.pop("text_key_reason", None) or error.text_key}
+
+
 class UsageError(HubsideError):
     """The command or file does not make sense. Details: reason."""
 
@@ -553,13 +559,16 @@ class NotHeldError(RefusedError):
 
 
 class InterlockError(RefusedError):
-    """An interlock keeps the axis from moving. Details: device, interlock, reason."""
+    """An interlock keeps the axis from moving. Details: device, interlock, reason_key and what fills it."""
 
     code = "interlock"
 
 
 class AxisStateError(RefusedError):
-    """The axis is in another state than the command wants. Details: device, state, wanted."""
+    """The axis is otherwise than the command needs it.
+
+    Details: device, state or state_key, wanted, wanted_key or wanted_keys, and what fills them.
+    """
 
     code = "axis_state"
 
@@ -601,7 +610,7 @@ class PdoNoUndoError(RefusedError):
 
 
 class BatteryConditionError(RefusedError):
-    """A condition of the battery test does not hold. Details: device, condition, reason."""
+    """A condition of the battery test does not hold. Details: device, condition, reason_key and what fills it."""
 
     code = "battery_condition"
 
@@ -719,7 +728,7 @@ class TwinsGoneError(NoAnswerError):
 
 
 class UnverifiedError(HubsideError):
-    """Sent, but not verified. Details: address, name, sent, found, reason."""
+    """Sent, but not verified. Details: address, name, sent, found, reason_key and what fills it."""
 
     code = "unverified"
     exit_code = 6
@@ -732,19 +741,19 @@ class BatteryCommandError(UnverifiedError):
 
 
 class BatteryArmedError(UnverifiedError):
-    """The link was lost while a battery test was armed: it may begin by itself. Details: device, reason."""
+    """The link was lost while a battery test was armed: it may begin. Details: device, reason_key with its own."""
 
     code = "battery_armed"
 
 
 class BatteryCounterError(UnverifiedError):
-    """The charge counter is not known to be 0. Details: device, counter (what it reads, or a dash), reason."""
+    """The charge counter is not known to be 0. Details: device, counter (as read, or a dash), reason_key."""
 
     code = "battery_counter"
 
 
 class BatteryUnsavedError(UnverifiedError):
-    """The charge counter is 0 in RAM and the save was not acknowledged. Details: device, reason."""
+    """The charge counter is 0 in RAM and the save was not acknowledged. Details: device, reason_key."""
 
     code = "battery_unsaved"
 

@@ -366,9 +366,9 @@ class CanOpenDriver:
         if status.state is not PortState.CONNECTED:
             raise BusLostError(bus=self.bus, reason=status.reason or status.state.value)
         if self._config.listen_only or self._listening:
-            raise RefusedError(device=self.bus, address="", reason="the connection is listening only")
+            raise RefusedError(device=self.bus, address="", reason_key="refused.listening")
         if asked and self.needs_consent:
-            raise ConsentError(bus=self.bus, seen=", ".join(sign.value for sign in self._masters_before))
+            raise ConsentError(bus=self.bus, seen_keys=[sign.text_key for sign in self._masters_before])
 
 
 def _settle(future: asyncio.Future[Any], result: object, error: Exception | None) -> None:

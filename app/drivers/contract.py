@@ -50,6 +50,11 @@ class MasterSign(Enum):
     RPDO = "rpdo"
     NODE_GUARDING = "node_guarding"
 
+    @property
+    def text_key(self) -> str:
+        """Text key of what was seen."""
+        return f"master_sign.{self.value}"
+
 
 class MasterSeen(NamedTuple):
     """A frame that only another master sends; ``t_ns`` is when it was seen last, ``times`` how often."""

@@ -177,7 +177,7 @@ def write_steps(
     if end is End.SILENT:
         raise NoAnswerError(node=node, address=str(address), timeout_s=timeout_ns / 1e9)
     if end is End.LOST:
-        raise BusLostError(bus=bus, node=node, address=str(address), reason="lost while writing, outcome unknown")
+        raise BusLostError(bus=bus, node=node, address=str(address), reason_key="bus_lost.while_writing")
     counters.readbacks += 1
     readback, end = yield from _upload(address, read_timeout_ns, counters)
     return _decide(node, transfer, readback, end, verify, bus)
@@ -188,12 +188,14 @@ def _decide(node: int, written: Transfer, readback: Upload, end: End, verify: Ve
     if late_abort is not None and not (end is End.REFUSED and readback.abort_code == late_abort):
         raise abort_error(node, address, late_abort)
     if end is End.LOST:
-        raise BusLostError(bus=bus, node=node, address=str(address), reason="lost while writing, outcome unknown")
+        raise BusLostError(bus=bus, node=node, address=str(address), reason_key="bus_lost.while_writing")
     if end is End.TIMED_OUT or end is End.SILENT:
         raise NoAnswerError(node=node, address=str(address), timeout_s=written.timeout_ns / 1e9, outcome="unknown")
     found = readback.data.hex() if end is End.DONE else None
     if end is End.DONE and verify is Verify.EQUAL and readback.data == written.data:
         written.executed = True
         return Written.READ_BACK
-    reason = "differs" if end is End.DONE and verify is Verify.EQUAL else "outcome unknown"
-    raise UnverifiedError(node=node, address=str(address), sent=written.data.hex(), found=found, reason=reason)
+    reason = "other_value" if end is End.DONE and verify is Verify.EQUAL else "unknown"
+    raise UnverifiedError(
+        node=node, address=str(address), sent=written.data.hex(), found=found, reason_key=f"unverified.{reason}"
+    )

@@ -19,6 +19,11 @@ class AxisState(Enum):
     FAULT = 0x08
 
     @property
+    def text_key(self) -> str:
+        """Text key of the state."""
+        return f"axis_state.{_NAMES.get(self, self.name.lower())}"
+
+    @property
     def mask(self) -> int:
         """The bits that count: bit 5 says nothing in states without power."""
         return 0x4F if self in _SHORT else 0x6F
@@ -29,6 +34,7 @@ class AxisState(Enum):
         return next((state for state in cls if statusword & state.mask == state.value), None)
 
 
+_NAMES: Final = {AxisState.NOT_READY: "not_ready_to_switch_on", AxisState.READY: "ready_to_switch_on"}
 _SHORT: Final = (
     AxisState.NOT_READY,
     AxisState.SWITCH_ON_DISABLED,

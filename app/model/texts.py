@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any, Final
@@ -23,16 +23,20 @@ class Texts:
     def __call__(self, key: str, /, **details: Any) -> str:
         """The text of ``key`` with its placeholders filled; a placeholder without a detail becomes a dash.
 
-        A detail ``reason_key`` is the key of a text, which fills ``{reason}``, and whose own placeholders are filled
-        likewise.
+        A detail ``reason_key`` is the key of a text, which fills ``{reason}``; a detail ``seen_keys`` holds several,
+        which fill ``{seen}``. Placeholders of such a text are filled likewise, its own name by the plain detail.
         """
-        filled = _Dashes((name, str(value)) for name, value in details.items())
+        plain = {name: str(value) for name, value in details.items() if value is not None}
+        keys = {name: found for one, value in details.items() for name, found in _keys(one, value)}
+        words = {name: self._joined(found, plain) for name, found in keys.items()}
         words = {
-            name.removesuffix("_key"): self._find(str(key)).format_map(filled)
-            for name, key in details.items()
-            if name.endswith("_key")
+            name: self._joined(found, plain | {other: text for other, text in words.items() if other != name})
+            for name, found in keys.items()
         }
-        return self._find(key).format_map(_Dashes(words | filled))
+        return self._find(key).format_map(_Dashes(plain | words))
+
+    def _joined(self, keys: Iterable[str], details: Mapping[str, str]) -> str:
+        return ", ".join(self._find(key).format_map(_Dashes(details)) for key in keys)
 
     def _find(self, key: str) -> str:
         return self._texts.get(key) or self._fallback.get(key) or key
@@ -49,6 +53,14 @@ class Texts:
     def flat(self) -> Mapping[str, str]:
         """All keys with their texts, English where this language has none."""
         return {**self._fallback, **self._texts}
+
+
+def _keys(name: str, value: Any) -> Iterator[tuple[str, tuple[str, ...]]]:
+    """The placeholder that a detail fills by texts, and their keys."""
+    if name.endswith("_key"):
+        yield name.removesuffix("_key"), (str(value),)
+    elif name.endswith("_keys") and isinstance(value, list | tuple) and value:
+        yield name.removesuffix("_keys"), tuple(str(one) for one in value)
 
 
 class _Dashes(dict[str, str]):

@@ -67,11 +67,6 @@ _STOPPED: Final = "axis_state.quick_stop_active"
 _FAULT: Final = ("axis_state.fault", "axis_state.fault_reaction_active")
 _COMPLAINTS: Final = ((STATUSWORD, 1 << 7, 1 << 3), (Address(0x3000), 1 << 1, 1 << 2))
 """Status objects with their bits of warning and of fault (CiA 402, statusword; OAT manual, table 11)."""
-_STATES: Final = {state: f"axis_state.{state.name.lower()}" for state in AxisState} | {
-    AxisState.NOT_READY: "axis_state.not_ready_to_switch_on",
-    AxisState.READY: "axis_state.ready_to_switch_on",
-}
-"""Text keys of the states that a statusword shows (CiA 402, statusword)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -261,7 +256,7 @@ def _demand(devices: list[Target], state: str | None) -> float | None:
 def axis_state(status: int) -> str | None:
     """Text key of the state in a statusword; None for bits that no state has."""
     state = AxisState.of(status)
-    return None if state is None else _STATES[state]
+    return None if state is None else state.text_key
 
 
 def _lookups(devices: Iterable[Target], address: Address) -> Iterable[Raw | None]:

@@ -13,6 +13,7 @@ from app.errors import (
     NoAnswerError,
     PreconditionError,
     UnverifiedError,
+    because,
 )
 from app.model.address import Address
 from app.model.checks import Allow, check_write
@@ -144,9 +145,9 @@ async def _read_back(driver: Driver, target: Target, entry: Entry, sent: bytes) 
     try:
         found = await driver.read(target.node, entry.address, entry.timeout_s)
     except (NoAnswerError, DeviceError) as error:
-        raise UnverifiedError(**details, found="–", reason=error.code) from error
+        raise UnverifiedError(**(because(error) | details), found="–") from error
     if found != sent:
-        raise UnverifiedError(**details, found=found.hex(" "), reason="another value was read back")
+        raise UnverifiedError(**details, found=found.hex(" "), reason_key="unverified.other_value")
     return decode(entry, found)
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Final
 
-from app.errors import BatteryCounterError, BatteryUnsavedError, HubsideError, RefusedError
+from app.errors import BatteryCounterError, BatteryUnsavedError, HubsideError, RefusedError, because
 from app.service.battery.objects import CHARGED_TOTAL, read_number
 from app.service.devices import Target
 from app.service.journal import Journal
@@ -33,15 +33,14 @@ async def reset_counter(driver: Any, target: Target, journal: Journal, now_ns: C
     except RefusedError:
         raise
     except HubsideError as error:
-        raise BatteryCounterError(
-            device=target.slug, counter=await _counter(driver, target), reason=error.code
-        ) from error
+        own = {"device": target.slug, "counter": await _counter(driver, target)}
+        raise BatteryCounterError(**(because(error) | own)) from error
     if counter > GAINED_MAH:
-        raise BatteryCounterError(device=target.slug, counter=counter, reason="another value was read back")
+        raise BatteryCounterError(device=target.slug, counter=counter, reason_key="unverified.other_value")
     try:
         await save(driver, target, journal, now_ns)
     except HubsideError as error:
-        raise BatteryUnsavedError(device=target.slug, reason=error.code) from error
+        raise BatteryUnsavedError(**(because(error) | {"device": target.slug})) from error
     return counter
 
 

@@ -60,12 +60,18 @@ class Need:
     holds_back: bool
     details: Mapping[str, Any]
 
+    @property
+    def reason(self) -> dict[str, Any]:
+        """The details of an error for which it is the reason."""
+        name = self.condition.value
+        return {"condition": name, "reason_key": f"page.setup.battery.need.{name}.bites", **self.details}
+
 
 async def look(connection: Connection, motion: MotionDesk | None, target: Target) -> list[Need]:
     """How every condition of a device's battery test stands now. What is not known holds back."""
     found = await read_numbers(connection.driver(target), target, _LOOKED_AT)
     return [
-        Need(Condition.ANSWERS, any(found[one] is None for one in _LOOKED_AT), {"device": target.slug}),
+        Need(Condition.ANSWERS, any(found[one] is None for one in _LOOKED_AT), {}),
         Need(Condition.NO_TEST, bool((found[TEST_STATUS] or 0) & TestStatus.ACTIVE), {}),
         _charged(found[CHARGE_PERCENT]),
         _mains(found),
@@ -105,12 +111,12 @@ async def _stands(connection: Connection, target: Target) -> Need:
 
 def _nobody_moves(motion: MotionDesk | None) -> Need:
     running = None if motion is None else motion.running
-    return Need(Condition.NOBODY_MOVES, running is not None, {"device": UNKNOWN if running is None else running.slug})
+    return Need(Condition.NOBODY_MOVES, running is not None, {"axis": UNKNOWN if running is None else running.slug})
 
 
 async def _no_restore(connection: Connection, target: Target) -> Need:
     try:
         await target.pass_gate(connection.driver(target))
-    except HubsideError as error:
-        return Need(Condition.NO_RESTORE, True, {"reason": error.code})
-    return Need(Condition.NO_RESTORE, False, {"reason": UNKNOWN})
+    except HubsideError:
+        return Need(Condition.NO_RESTORE, True, {})
+    return Need(Condition.NO_RESTORE, False, {})

@@ -10,6 +10,7 @@ from typing import Final
 
 from app.errors import BatteryConditionError, BatteryNotNotedError, HubsideError, StoreError
 from app.model.sets import IDENTITY
+from app.model.station import station_slug
 from app.service.battery.archive import Archive
 from app.service.battery.change import reset_counter
 from app.service.battery.commands import Edges
@@ -87,8 +88,9 @@ class BatteryDesk:
         slug = target.slug
         require_battery(target)
         if self._closed or slug in self._running or slug in self._beginning:
-            raise BatteryConditionError(device=slug, condition=Condition.NO_TEST.value, reason=slug)
+            raise BatteryConditionError(device=slug, **Need(Condition.NO_TEST, True, {}).reason)
         self._beginning.add(slug)
+        self._motion.batteries_tested.add(station_slug(slug))
         try:
             await self._require(target)
             driver = self._connection.driver(target)
@@ -102,12 +104,18 @@ class BatteryDesk:
             running = self._running[slug] = Running(person, self._connection.stamper(), before, sequence, task)
         finally:
             self._beginning.discard(slug)
+            self._let_move(slug)
         begun = asyncio.create_task(sequence.begun.wait())
         await asyncio.wait({begun, task}, return_when=asyncio.FIRST_COMPLETED)
         begun.cancel()
         if task.done():
             await task  # raises what kept it from beginning
         return running
+
+    def _let_move(self, slug: str) -> None:
+        """Where nothing of a test is under way, the axes of the station may move, as far as its unit says so too."""
+        if slug not in self._running:
+            self._motion.batteries_tested.discard(station_slug(slug))
 
     def cancel(self, target: Target) -> None:
         """Stop watching the test of a device; nothing happens where none runs."""
@@ -122,8 +130,7 @@ class BatteryDesk:
     async def _require(self, target: Target, only: frozenset[Condition] | None = None) -> None:
         for need in await self.needs(target):
             if need.holds_back and (only is None or need.condition in only):
-                reason = ", ".join(str(value) for value in need.details.values()) or "–"
-                raise BatteryConditionError(device=target.slug, condition=need.condition.value, reason=reason)
+                raise BatteryConditionError(device=target.slug, **need.reason)
 
     async def _run(
         self, target: Target, person: str, sequence: Sequence, before: Figures, journal: Journal
@@ -156,6 +163,7 @@ class BatteryDesk:
             raise
         finally:
             self._running.pop(target.slug, None)
+            self._let_move(target.slug)
             journal.note(Kind.BATTERY_TEST_ENDED, target.slug, verdict=verdict_name)
 
     # -- charger -----------------------------------------------------------------------

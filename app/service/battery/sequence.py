@@ -13,7 +13,7 @@ import asyncio
 from enum import Enum
 from typing import Any, Final
 
-from app.errors import BatteryArmedError, BatteryCommandError, HubsideError
+from app.errors import BatteryArmedError, BatteryCommandError, HubsideError, because
 from app.service.battery.commands import Edges
 from app.service.battery.objects import (
     BATTERY_V,
@@ -108,7 +108,7 @@ class Sequence:
             raise
         except HubsideError as error:
             if self._edges.sent:
-                raise BatteryArmedError(device=self._target.slug, reason=error.code) from error
+                raise BatteryArmedError(**(because(error) | {"device": self._target.slug})) from error
             raise
 
     async def _begin(self) -> None:
@@ -123,7 +123,7 @@ class Sequence:
                 raise
             except HubsideError as error:
                 if loop.time() >= end_s:
-                    raise BatteryArmedError(device=self._target.slug, reason=error.code) from error
+                    raise BatteryArmedError(**(because(error) | {"device": self._target.slug})) from error
             await asyncio.sleep(SAMPLE_S)
 
     async def _watch(self) -> Verdict:

@@ -104,14 +104,17 @@ class Control:
         self.require_own()
         self._sent = True
         if not self._send_counted(word):
-            state = "not operational, or no event-driven RPDO carries 6040h alone"
-            raise AxisStateError(device=self.target.slug, state=state, wanted="operational")
+            raise AxisStateError(
+                device=self.target.slug, state_key="axis_found.not_by_pdo", wanted_key="axis_needed.operational"
+            )
 
     async def halt(self) -> None:
         """Halt an axis that is enabled; any other one would be enabled by that word. Raises AxisStateError too."""
         state = await self.state()
         if state is not AxisState.OPERATION_ENABLED:
-            raise AxisStateError(device=self.target.slug, state=state.name.lower(), wanted="operation_enabled")
+            raise AxisStateError(
+                device=self.target.slug, state_key=state.text_key, wanted_key=AxisState.OPERATION_ENABLED.text_key
+            )
         self.word(Word.HALT)
 
     def stop(self) -> bool:
@@ -155,7 +158,9 @@ class Control:
         data = await self.driver.read(self.target.node, address)
         raw = decode(self.target.entry(address), data)
         if not isinstance(raw, int):
-            raise AxisStateError(device=self.target.slug, state=data.hex(" "), wanted=address.short)
+            raise AxisStateError(
+                device=self.target.slug, state=data.hex(" "), wanted_key="axis_needed.number", address=address.short
+            )
         return raw
 
     async def status(self) -> int:
@@ -167,7 +172,7 @@ class Control:
         status = await self.status()
         found = AxisState.of(status)
         if found is None:
-            raise AxisStateError(device=self.target.slug, state=f"{status:04X}h", wanted="CiA 402")
+            raise AxisStateError(device=self.target.slug, state=f"{status:04X}h", wanted_key="axis_needed.known")
         return found
 
     async def until(self, wanted: Collection[AxisState], timeout_s: float = STATE_TIMEOUT_S) -> AxisState:
@@ -176,8 +181,8 @@ class Control:
         while (state := await self.state()) not in wanted:
             late = asyncio.get_running_loop().time() >= end_s
             if late or (state is AxisState.FAULT and AxisState.FAULT not in wanted):
-                names = " / ".join(sorted(one.name.lower() for one in wanted))
-                raise AxisStateError(device=self.target.slug, state=state.name.lower(), wanted=names)
+                keys = [one.text_key for one in AxisState if one in wanted]
+                raise AxisStateError(device=self.target.slug, state_key=state.text_key, wanted_keys=keys)
             await asyncio.sleep(_LOOK_S)
         return state
 
@@ -186,8 +191,10 @@ class Control:
         end_s = asyncio.get_running_loop().time() + timeout_s
         while (status := await self.status()) & bits != (bits if are_set else 0):
             if asyncio.get_running_loop().time() >= end_s:
-                wanted = f"bits {bits:04X}h {'set' if are_set else 'clear'}"
-                raise AxisStateError(device=self.target.slug, state=f"{status:04X}h", wanted=wanted)
+                key = f"axis_needed.bits_{'set' if are_set else 'clear'}"
+                raise AxisStateError(
+                    device=self.target.slug, state=f"{status:04X}h", wanted_key=key, bits=f"{bits:04X}h"
+                )
             await asyncio.sleep(_LOOK_S)
         return status
 
@@ -204,7 +211,12 @@ class Control:
         """An angle of the axis, or its speed, by its own word. Raises AxisStateError where its scale is not known."""
         found = to_scaled(self.target.entry(address), await self.number(address), self.target.lookup)
         if found is None:
-            raise AxisStateError(device=self.target.slug, state="–", wanted=address.short)
+            raise AxisStateError(
+                device=self.target.slug,
+                state_key="axis_found.unknown",
+                wanted_key="axis_needed.scale",
+                address=address.short,
+            )
         return float(found.number)
 
     async def until_still(self, timeout_s: float = STAND_TIMEOUT_S) -> bool:
@@ -223,9 +235,12 @@ class Control:
         """Raises AxisStateError where the axis has power or does not stand."""
         state = await self.state()
         if state not in _OFF:
-            raise AxisStateError(device=self.target.slug, state=state.name.lower(), wanted="ready_to_switch_on")
+            keys = [one.text_key for one in AxisState if one in _OFF]
+            raise AxisStateError(device=self.target.slug, state_key=state.text_key, wanted_keys=keys)
         if not await self.until_still(timeout_s=0.0):
-            raise AxisStateError(device=self.target.slug, state="moving", wanted="standstill")
+            raise AxisStateError(
+                device=self.target.slug, state_key="axis_found.moving", wanted_key="axis_needed.standstill"
+            )
 
     # -- sequences -------------------------------------------------------------------
 
@@ -258,7 +273,7 @@ class Control:
         found = await self.number(MODE_SHOWN)
         if found != mode:
             raise UnverifiedError(
-                address=MODE.short, name="mode", sent=str(int(mode)), found=str(found), reason="the mode did not change"
+                address=MODE.short, name="mode", sent=str(int(mode)), found=str(found), reason_key="unverified.mode"
             )
 
     async def mode_back(self, mode: int) -> bool:
@@ -286,7 +301,9 @@ class Control:
         end_s = asyncio.get_running_loop().time() + STATE_TIMEOUT_S
         while await self.number(CONTROLWORD) & _ENABLE_OPERATION:
             if asyncio.get_running_loop().time() >= end_s:
-                raise AxisStateError(device=self.target.slug, state="enabled by 6040h", wanted="6040h bit 3 = 0")
+                raise AxisStateError(
+                    device=self.target.slug, state_key="axis_found.enabled", wanted_key="axis_needed.not_enabled"
+                )
             await asyncio.sleep(_LOOK_S)
 
     async def enable(self) -> None:
@@ -296,7 +313,9 @@ class Control:
         """
         state = await self.state()
         if state in (AxisState.FAULT, AxisState.FAULT_REACTION_ACTIVE):
-            raise AxisStateError(device=self.target.slug, state=state.name.lower(), wanted="operation_enabled")
+            raise AxisStateError(
+                device=self.target.slug, state_key=state.text_key, wanted_key=AxisState.OPERATION_ENABLED.text_key
+            )
         if state is AxisState.OPERATION_ENABLED:
             self.word(Word.HALT)
             return

@@ -270,7 +270,9 @@ class _Run:
         status = self._target.lookup(STATUSWORD)
         state = AxisState.of(status) if isinstance(status, int) else None
         if state in (AxisState.FAULT, AxisState.FAULT_REACTION_ACTIVE):
-            raise AxisStateError(device=self._target.slug, state=state.name.lower(), wanted="operation_enabled")
+            raise AxisStateError(
+                device=self._target.slug, state_key=state.text_key, wanted_key=AxisState.OPERATION_ENABLED.text_key
+            )
         if state is not AxisState.OPERATION_ENABLED:
             self._running.end(Ended.STOPPED)
             return True
@@ -286,7 +288,9 @@ class _Run:
             return
         view = self._target.live.node(self._target.device.bus, node)
         if view is None or view.state is not NmtState.OPERATIONAL:
-            raise AxisStateError(device=self._target.slug, state="not operational", wanted="operational")
+            raise AxisStateError(
+                device=self._target.slug, state_key="axis_found.not_operational", wanted_key="axis_needed.operational"
+            )
         frame = pdo.pack(self._pdo.mapping, {**self._beside, TARGET: data})
         parameters = self._pdo.parameters
         driver.command_raw(node, TARGET, Can(parameters.can_id, frame, parameters.extended))

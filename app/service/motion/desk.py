@@ -134,6 +134,8 @@ class MotionDesk:
         self.lease = Lease(now_s, lambda: connection.stamper() // 1000)
         self.dead_man = DeadMan(now_s)
         self.confirmed = Confirmed()
+        self.batteries_tested: set[str] = set()
+        """Stations whose battery is tested from here, from before its conditions are looked at."""
         self.running: Running | None = None
         self.last: Last | None = None
         self.prepared: dict[str, Prepared] = {}
@@ -373,14 +375,13 @@ class MotionDesk:
         """How every interlock of an axis stands. Raises UsageError."""
         target = self._axis(slug)
         heartbeat = self._heartbeats.get(target.device.bus)
-        return await interlocks.look(self.connection, target, heartbeat, self.confirmed)
+        return await interlocks.look(self.connection, target, heartbeat, self.confirmed, self.batteries_tested)
 
     async def require_clear(self, slug: str) -> None:
         """Raises InterlockError for the first interlock that holds the axis back."""
         for standing in await self.interlocks(slug):
             if standing.holds_back:
-                reason = ", ".join(f"{name} {value}" for name, value in standing.details.items()) or "–"
-                raise InterlockError(device=slug, interlock=standing.interlock.value, reason=reason)
+                raise InterlockError(device=slug, **standing.reason)
 
     async def prepare(self, slug: str, fence: int) -> Prepared:
         """Set an axis up and have it prove that it stops by itself; held all the while.
@@ -505,8 +506,8 @@ class MotionDesk:
     async def _require_no_feather(self, control: Control) -> None:
         """Raises InterlockError where an EFC is under way: whatever is commanded now would end it."""
         if await control.is_feathering():
-            reason = "an emergency feather drive is under way; STOP ends it"
-            raise InterlockError(device=control.target.slug, interlock="feathering", reason=reason)
+            key = "interlock.reason.feathering"
+            raise InterlockError(device=control.target.slug, interlock="feathering", reason_key=key)
 
     async def without_proof(
         self, slug: str, fence: int, doing: Doing, work: Callable[[Running], Awaitable[None]]
@@ -585,9 +586,15 @@ class MotionDesk:
         if self._closed:
             raise NotConnectedError
         if self.running is not None:
-            raise InterlockError(device=self.running.slug, interlock="running", reason=self.running.doing.value)
+            raise InterlockError(
+                device=self.running.slug,
+                interlock="running",
+                reason_key="interlock.reason.running",
+                doing_key=f"motion.doing.{self.running.doing.value}",
+            )
         if self._kept_still is not None:
-            raise InterlockError(device=self._kept_still, interlock="running", reason="PDO")
+            key = "interlock.reason.pdo_change"
+            raise InterlockError(device=self._kept_still, interlock="running", reason_key=key)
 
     async def _is_held(self, order: int) -> bool:
         """Whether it is held. An order may be ahead of the beat that was sent before it, on another connection."""

@@ -78,7 +78,9 @@ async def _until_there(running: Running, target_deg: float) -> None:
     while not running.over.is_set():
         state = await control.state()
         if state in _FAILED:
-            raise AxisStateError(device=running.slug, state=state.name.lower(), wanted="operation_enabled")
+            raise AxisStateError(
+                device=running.slug, state_key=state.text_key, wanted_key=AxisState.OPERATION_ENABLED.text_key
+            )
         near = abs(await control.degrees(POSITION) - target_deg) <= _REACHED_DEG
         if control.overtaken:
             running.end(Ended.STOPPED)

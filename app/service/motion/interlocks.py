@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any, Final
@@ -18,6 +18,7 @@ from app.service.bus_link import BusLink
 from app.service.connection import Connection
 from app.service.devices import Target
 from app.service.motion.heartbeat import Heartbeat
+from app.service.motion.self_tests import Testing, look_at_tests
 from app.service.restore.precheck import MASTER_QUIET_NS
 from app.service.rule_check import check_live
 from app.service.stop import is_axis
@@ -41,6 +42,8 @@ class Interlock(Enum):
     NO_MASTER = "no_master"
     RECORDING = "recording"
     HEARTBEAT_NODE = "heartbeat_node"
+    BATTERY_TEST = "battery_test"
+    INPUT_TEST = "input_test"
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +53,12 @@ class Standing:
     interlock: Interlock
     holds_back: bool
     details: Mapping[str, Any]
+
+    @property
+    def reason(self) -> dict[str, Any]:
+        """The details of an error for which it is the reason."""
+        name = self.interlock.value
+        return {"interlock": name, "reason_key": f"interlock.{name}.bites", **self.details}
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,10 +70,17 @@ class Confirmed:
 
 
 async def look(
-    connection: Connection, target: Target, heartbeat: Heartbeat | None, confirmed: Confirmed
+    connection: Connection,
+    target: Target,
+    heartbeat: Heartbeat | None,
+    confirmed: Confirmed,
+    tested_here: Collection[str] = (),
 ) -> list[Standing]:
-    """How every interlock of an axis stands now. Of blades that nobody has looked at lately the angle is asked."""
-    await _ask_others(connection, target)
+    """How every interlock of an axis stands now. ``tested_here``: stations whose battery is tested by this bench.
+
+    Of blades that nobody has looked at lately the angle is asked, and the units of the axis what they test.
+    """
+    tests, _ = await asyncio.gather(look_at_tests(connection, target), _ask_others(connection, target))
     link = connection.buses[target.device.bus]
     status = link.status
     state = None if connection.recording is None else connection.recording.status().state
@@ -82,7 +98,14 @@ async def look(
             heartbeat is None or heartbeat.seen,
             {"node": "–" if heartbeat is None else heartbeat.node},
         ),
+        _battery(tests.battery, station_slug(target.slug) in tested_here),
+        Standing(Interlock.INPUT_TEST, tests.inputs is not Testing.NO, {"clamps": tests.clamps}),
     ]
+
+
+def _battery(seen: Testing, here: bool) -> Standing:
+    found = Testing.YES if here else seen
+    return Standing(Interlock.BATTERY_TEST, found is not Testing.NO, {"state_key": found.text_key})
 
 
 def others_at_work(connection: Connection, target: Target) -> bool:
@@ -91,14 +114,13 @@ def others_at_work(connection: Connection, target: Target) -> bool:
 
 
 def _heard(link: BusLink, now_ns: int) -> list[str]:
-    return [one.sign.value for one in link.status.masters if now_ns - one.t_ns < MASTER_QUIET_NS]
+    return [one.sign.text_key for one in link.status.masters if now_ns - one.t_ns < MASTER_QUIET_NS]
 
 
 def _masters(link: BusLink, now_ns: int) -> Standing:
     seen = _heard(link, now_ns)
-    return Standing(
-        Interlock.NO_MASTER, bool(seen) or link.needs_consent, {"seen": ", ".join(dict.fromkeys(seen)) or "–"}
-    )
+    keys = list(dict.fromkeys(seen))
+    return Standing(Interlock.NO_MASTER, bool(seen) or link.needs_consent, {"seen_keys": keys} if keys else {})
 
 
 async def _ask_others(connection: Connection, target: Target) -> None:
@@ -138,6 +160,6 @@ def _rules(targets: Iterable[Target], target: Target) -> Standing:
 async def _restore(connection: Connection, target: Target) -> Standing:
     try:
         await target.pass_gate(connection.driver(target))
-    except HubsideError as error:
-        return Standing(Interlock.NO_RESTORE, True, {"reason": error.code})
-    return Standing(Interlock.NO_RESTORE, False, {"reason": "–"})
+    except HubsideError:
+        return Standing(Interlock.NO_RESTORE, True, {})
+    return Standing(Interlock.NO_RESTORE, False, {})

@@ -228,7 +228,7 @@ async def _require_at(control: Control, angle_deg: float) -> None:
             name=control.target.entry(POSITION).title,
             sent=f"{angle_deg:g}",
             found=f"{found_deg:g}",
-            reason="the axis confirmed it and stands elsewhere",
+            reason_key="unverified.elsewhere",
         )
 
 

@@ -107,7 +107,9 @@ async def _free_consumer(control: Control, node: int) -> Address:
         if free is None and (raw & 0xFFFF == 0 or raw >> 16 & 0xFF == 0):
             free = address
     if free is None:
-        raise InterlockError(device=control.target.slug, interlock="heartbeat", reason="no entry of 1016h is free")
+        raise InterlockError(
+            device=control.target.slug, interlock="heartbeat", reason_key="interlock.reason.no_consumer"
+        )
     return free
 
 
@@ -132,7 +134,10 @@ async def check(axis: Prepared) -> None:
     for address, data in axis.settings.items():
         if found[address] != data:
             raise InterlockError(
-                device=axis.slug, interlock="heartbeat", reason=f"{address.short} is not what was prepared any more"
+                device=axis.slug,
+                interlock="heartbeat",
+                reason_key="interlock.reason.changed",
+                address=address.short,
             )
 
 
@@ -150,19 +155,19 @@ async def prove(axis: Prepared, heartbeat: Heartbeat, held: Callable[[], bool]) 
         await asyncio.sleep(_SETTLE_S)
         last_s = heartbeat.withhold(axis.slug)
         if await control.state() is not AxisState.OPERATION_ENABLED:
-            raise _not_proven(axis, "it did not stay enabled")
+            raise _not_proven(axis, "not_enabled")
         while await control.state() is AxisState.OPERATION_ENABLED:
             if not held():
                 raise NotHeldError(device=axis.slug)
             if loop.time() - last_s > PROOF_S:
-                raise _not_proven(axis, f"still enabled {PROOF_S} s after our last heartbeat")
+                raise _not_proven(axis, "still_enabled", PROOF_S)
             await asyncio.sleep(_LOOK_S)
         took_s = loop.time() - last_s
         control.require_own()  # a STOP proves nothing
         if not held():
             raise NotHeldError(device=axis.slug)
         if took_s < CONSUMER_MS / 1000 - _EARLY_S:
-            raise _not_proven(axis, f"it stopped for another reason, after {took_s:.2f} s")
+            raise _not_proven(axis, "early", round(took_s, 2))
         axis.proof_s = took_s
     finally:
         heartbeat.go_on(axis.slug)
@@ -171,8 +176,9 @@ async def prove(axis: Prepared, heartbeat: Heartbeat, held: Callable[[], bool]) 
     return axis.proof_s
 
 
-def _not_proven(axis: Prepared, reason: str) -> InterlockError:
-    return InterlockError(device=axis.slug, interlock="proof", reason=reason)
+def _not_proven(axis: Prepared, reason: str, seconds: float | None = None) -> InterlockError:
+    key = f"interlock.reason.{reason}"
+    return InterlockError(device=axis.slug, interlock="proof", reason_key=key, seconds=seconds)
 
 
 async def after_proof(control: Control) -> None:
@@ -186,7 +192,9 @@ async def after_proof(control: Control) -> None:
     if not await control.status() & REMOTE or await control.state() is AxisState.FAULT:
         state = await control.reset_fault()
         if state is AxisState.FAULT or not await control.status() & REMOTE:
-            raise InterlockError(device=control.target.slug, interlock="proof", reason="the fault cannot be reset")
+            raise InterlockError(
+                device=control.target.slug, interlock="proof", reason_key="interlock.reason.fault_stays"
+            )
     await control.switch_off()
 
 
@@ -197,7 +205,7 @@ async def put_back(control: Control, left: Left, journal: Journal) -> None:
     raise, StoreError; what is done by then is done.
     """
     if left.of(control.target.slug) and not await control.until_off(OFF_TIMEOUT_S):
-        raise InterlockError(device=control.target.slug, interlock="running", reason="the axis has power")
+        raise InterlockError(device=control.target.slug, interlock="running", reason_key="interlock.reason.has_power")
     slug, node = control.target.slug, control.target.node
     for address, changed in reversed(left.of(slug).items()):
         if await control.driver.read(node, address) == changed.now:
@@ -237,7 +245,7 @@ async def _until_operational(control: Control) -> None:
         if view is not None and view.state is NmtState.OPERATIONAL:
             return
         if loop.time() >= end_s:
-            raise InterlockError(device=target.slug, interlock="nmt", reason="the node does not become operational")
+            raise InterlockError(device=target.slug, interlock="nmt", reason_key="interlock.reason.not_operational")
         await asyncio.sleep(_LOOK_S)
 
 

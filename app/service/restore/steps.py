@@ -293,7 +293,7 @@ class Hands:
             if self.monotonic() > until:
                 name = target.entry(address).title
                 raise UnverifiedError(
-                    address=address.short, name=name, sent=str(raw), found=str(found), reason="it is not shown"
+                    address=address.short, name=name, sent=str(raw), found=str(found), reason_key="unverified.not_shown"
                 )
             await asyncio.sleep(LOOK_S)
         self.now = self.now.with_value(Place(target.slug, address), raw)

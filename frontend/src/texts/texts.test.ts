@@ -30,6 +30,6 @@ describe("texts", () => {
   it("look up details that are keys themselves", () => {
     expect(t("why", { device: "PMM", text_key_reason: "abort" })).toBe("PMM: value out of range");
     expect(t("why", { device: "PMM", reason_key: "abort" })).toBe("PMM: value out of range");
-    expect(t("why", { device: "PMM", reason_key: "abort", reason: "plain" })).toBe("PMM: plain");
+    expect(t("why", { device: "PMM", reason_key: "abort", reason: "plain" })).toBe("PMM: value out of range");
   });
 });

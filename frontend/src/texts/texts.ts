@@ -32,20 +32,29 @@ export const bootTranslator = (language: Language): Translate => translator(boot
 
 /**
  * Details that are keys themselves: `reason_key` and `text_key_reason` both fill the placeholder `reason` with a text,
- * whose own placeholders are filled likewise.
+ * `reason_keys` with several. Placeholders of such a text are filled likewise, its own name by the plain detail.
  */
-const KEY_NAMES = /^(?:(\w+)_key|text_key_(\w+))$/;
+const KEY_NAMES = /^(?:(\w+)_keys?|text_key_(\w+))$/;
 
 function nested(texts: Readonly<Record<string, string>>, details: Details): Details {
-  const filled: Details = { ...details };
+  const first = words(texts, details, {});
+  return { ...details, ...words(texts, details, first) };
+}
+
+/** The texts of all details that are keys, under both names; `others` fill their placeholders as well. */
+function words(texts: Readonly<Record<string, string>>, details: Details, others: Details): Details {
+  const found: Details = {};
   for (const [name, detail] of Object.entries(details)) {
     const match = KEY_NAMES.exec(name);
-    if (!match || typeof detail !== "string") continue;
-    const text = fill(texts[detail] ?? detail, details);
-    filled[name] = text;
-    filled[match[1] ?? match[2] ?? name] ??= text;
+    const keys = typeof detail === "string" ? [detail] : Array.isArray(detail) ? (detail as unknown[]) : [];
+    if (!match || keys.length === 0) continue;
+    const own = match[1] ?? match[2] ?? name;
+    const fillers: Details = { ...details, ...others, [own]: details[own] };
+    const text = keys.map((key) => fill(texts[String(key)] ?? String(key), fillers)).join(", ");
+    found[name] = text;
+    found[own] ??= text;
   }
-  return filled;
+  return found;
 }
 
 /** A placeholder without a detail becomes a dash, as on the server. */

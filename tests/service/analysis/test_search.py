@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import time
+from bisect import bisect_left
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -16,17 +17,18 @@ from hypothesis import strategies as st
 
 from app.model.address import Address, parse_address
 from app.recording.index import index_path
-from app.service.analysis.search.levels import Held, find_levels
+from app.service.analysis.search.levels import find_levels
 from app.service.analysis.search.match import Found, find
 from app.service.analysis.search.parser import parse_query
 from app.service.analysis.search.query import Comparison, Level, Scope
 from app.service.analysis.search.search import Hit, Search, Skipped, Unsearched, run_search, search_one
+from app.service.analysis.search.stretches import SHORT_NS, Held
 from app.service.indexing import Indexing
 from app.service.jobs import Job, Jobs, JobState
+from app.wire.signs import SignKind
 from tests.service.analysis.rig import BUS, S, at_s, look, scenario, the_trip
 from tests.web.rig import wait_until
 
-BUCKET_NS = 1 << 26
 EVERY = range(1, 9)
 
 
@@ -112,7 +114,7 @@ _TESTS = {
 }  # fmt: skip
 
 
-@settings(max_examples=60)
+@settings(max_examples=150, deadline=None)
 @given(st.sampled_from(sorted(EXACT)), st.sampled_from(Comparison), st.integers(0, 99), st.booleans(), st.data())
 def test_levels_are_found_where_the_values_are(
     which: tuple[int, int, str], comparison: Comparison, percentile: int, amount: bool, data: st.DataObject
@@ -137,7 +139,7 @@ def test_levels_that_were_found_where_no_value_fits(
 def hold_to_the_values(
     which: tuple[int, int, str], comparison: Comparison, percentile: int, amount: bool, first: int, last: int
 ) -> None:
-    """Every value that fits, from the ``first`` to the ``last``, is in a stretch, and every stretch has one."""
+    """What is found from the ``first`` value to the ``last`` is what a walk over all values finds, to the value."""
     number, node, text = which
     t_ns, raw = EXACT[which]
     shown = np.abs(raw) if amount else raw
@@ -149,11 +151,51 @@ def hold_to_the_values(
     span = (int(t_ns[first]), int(t_ns[last]) + 1)
     found = list(find_levels(look(number), level, [span]))
     held = _TESTS[comparison](shown, bound)
-    for t in t_ns[first : last + 1][held[first : last + 1]].tolist():
-        assert any(one.from_ns <= t <= one.to_ns for one in found), "a value that fits is in no stretch"
+    assert [(one.from_ns, one.to_ns, one.open, one.interrupted) for one in found] == walked(which, held, first, last)
     for one in found:
-        near = (t_ns >= one.from_ns - BUCKET_NS) & (t_ns < one.to_ns + BUCKET_NS)
-        assert (held & near).any(), "a stretch without a value that fits"
+        from_ns = one.from_ns - (SHORT_NS if one.open else 0)
+        assert one.extreme in raw[(t_ns >= from_ns) & (t_ns < one.to_ns) & held].tolist()
+
+
+def walked(
+    which: tuple[int, int, str], held: np.ndarray[Any, Any], first: int, last: int
+) -> list[tuple[int, int, bool, bool]]:
+    """Begin, end, whether open and whether interrupted, of each stretch: value by value, from the one before on."""
+    t_ns = EXACT[which][0].tolist()
+    begin, end = t_ns[first] >> 26 << 26, t_ns[last] + 1
+    looked_from = bisect_left(t_ns, begin)
+    before = max(0, looked_from - 1)
+    breaks = breaks_of(which)
+    found: list[list[Any]] = []
+    running = False
+    for at in range(before, last + 1):
+        broken = at > before and any(t_ns[at - 1] < one <= t_ns[at] for one in breaks)
+        if running and broken:
+            found[-1][1:3] = min(one for one in breaks if t_ns[at - 1] < one), True
+            running = False
+        if held[at] and not running:
+            whole = any(found and found[-1][1] <= one <= t_ns[at] for one in breaks)
+            if found and not whole and t_ns[at] - found[-1][1] <= SHORT_NS:
+                found[-1][3] = True
+            else:
+                found.append([max(t_ns[at], begin), end, at == before or at < looked_from or broken, False])
+            running = True
+        elif not held[at] and running:
+            found[-1][1] = t_ns[at]
+            running = False
+    later = [one for one in breaks if t_ns[last] < one < end]
+    if running and later:
+        found[-1][1:3] = min(later), True
+    elif running:
+        found[-1][1:3] = end, True
+    return [(begin, stop, is_open, cut) for begin, stop, is_open, cut in found if stop > t_ns[first]]
+
+
+def breaks_of(which: tuple[int, int, str]) -> list[int]:
+    number, node, text = which
+    one = look(number)
+    silent = [x.since_ns + 1 for x in one.signs if x.kind is SignKind.SILENT and not x.ends and x.node == node]
+    return sorted([*one.index.breaks(BUS, node, parse_address(text)).tolist(), *silent])
 
 
 def test_a_condition_that_was_interrupted_has_not_lasted() -> None:
@@ -297,11 +339,32 @@ def test_a_unit_that_does_not_fit_is_told_for_the_recording() -> None:
     assert told.reason is Unsearched.NOT_FITTING
 
 
-def test_what_matched_is_told_in_words() -> None:
+def test_what_matched_is_told_in_words_to_the_value() -> None:
     found = search_one(look(3).path, parse_query("60F4 > 0.5 deg within 5 s before emcy 8611"))
     assert isinstance(found, list)
-    words = found[0].words
-    assert words.en.startswith("Blade 2 PMC: actual following error (60F4) > 0.5 ° for at least ")
-    assert words.en.endswith("ms later: blade 2 PMC: following error too large (8611h)")
-    assert words.de.startswith("Blatt 2 PMC: aktueller Schleppfehler (60F4) > 0,5 °, mindestens ")
-    assert at_s(3, found[0].found.t_ns) == pytest.approx(26.515, abs=0.01)
+    (place,), words = [one.found for one in found], found[0].words
+    t_ns, raw = EXACT[3, 12, "60F4"]
+    before = t_ns < place.t_ns
+    first_ns = t_ns[before][np.flatnonzero(raw[before] <= 50)[-1] + 1]
+    ms = round((place.t_ns - first_ns) / 1e6)
+    assert (place.from_ns, ms) == (first_ns, 293)
+    name = "Blade 2 PMC: actual following error (60F4)"
+    assert words.en.startswith(f"{name} > 0.5 ° for at least {ms} ms, up to ")
+    assert words.en.endswith(f"; {ms} ms later: blade 2 PMC: following error too large (8611h)")
+    assert words.de.startswith(f"Blatt 2 PMC: aktueller Schleppfehler (60F4) > 0,5 °, mindestens {ms} ms lang, bis ")
+    assert at_s(3, place.t_ns) == pytest.approx(26.515, abs=0.01)
+
+
+def test_a_stretch_that_was_interrupted_for_moments_is_one_and_says_so() -> None:
+    told = search_one(look(3).path, parse_query("60F4 > 0.01 deg on node 12"))
+    assert isinstance(told, list)
+    interrupted = [one for one in told for _, what in one.found.what if isinstance(what, Held) and what.interrupted]
+    assert interrupted
+    assert all("with interruptions of 67 ms at most, up to" in one.words.en for one in interrupted)
+    assert all("lang mit Unterbrechungen von höchstens 67 ms, bis" in one.words.de for one in interrupted)
+
+
+def test_what_has_lasted_for_longer_than_the_time_before_the_event_counts() -> None:
+    for seconds, expected in ((1, 1), (2, 1), (20, 1), (25, 1), (26, 0)):
+        found = hits(3, f"6079 > 100 V for {seconds} s within 1 s before emcy 8611 on same node")
+        assert len(found) == expected, f"measured since 0.7 s, and the emergency comes after 26.5 s: {seconds} s"

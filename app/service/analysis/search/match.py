@@ -10,8 +10,9 @@ from typing import Final
 from app.model.description import Description
 from app.recording.node_table import NodeKey
 from app.service.analysis.look import Look
-from app.service.analysis.search.levels import Held, Span, check_level, find_levels, fits
+from app.service.analysis.search.levels import Span, check_level, find_levels, fits
 from app.service.analysis.search.query import All, Any, EventIs, Level, Not, Order, Pair, Query, Same, Special
+from app.service.analysis.search.stretches import Held
 from app.service.analysis.steps import onset_ns
 from app.service.analysis.trips import Trip
 from app.wire.events import Severity

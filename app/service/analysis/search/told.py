@@ -5,9 +5,9 @@ from __future__ import annotations
 from app.model.texts import load_texts
 from app.recording.node_table import NodeKey
 from app.service.analysis.look import Look
-from app.service.analysis.search.levels import Held
 from app.service.analysis.search.match import Found
 from app.service.analysis.search.query import Level, Query
+from app.service.analysis.search.stretches import Held
 from app.service.analysis.steps import Step
 from app.service.analysis.trips import Trip
 from app.service.analysis.words import Teller, Words, big, in_words, tellers
@@ -58,7 +58,7 @@ def _level(look: Look, teller: Teller, level: Level, key: NodeKey, held: Held, l
     texts, quantity = load_texts(language), look.quantity(key, entry)
     shown = f"{held.extreme * float(quantity.scale):.6g}"
     return texts(
-        "analysis.held_on" if held.cut else "analysis.held",
+        "analysis.held_on" if held.open else "analysis.held",
         who=teller.who([key]),
         name=texts.name(entry.title),
         address=level.address.short,
@@ -68,4 +68,5 @@ def _level(look: Look, teller: Teller, level: Level, key: NodeKey, held: Held, l
         extreme=teller.number(shown),
         own_unit=quantity.unit,
         lasting=teller.lasting(held.to_ns - held.from_ns),
+        gaps=texts("analysis.interrupted") if held.interrupted else "",
     )

@@ -13,6 +13,7 @@ import { ErrorHistory } from "./ErrorHistory";
 import { Measurements } from "./Measurements";
 import { MotionPanel } from "./MotionPanel";
 import { Plots } from "./Plots";
+import { RecordedNote } from "./RecordedNote";
 import { StateDiagram } from "./StateDiagram";
 
 /** One axis in full: its state machine, what it measures, its inputs and outputs, and what moves it. */
@@ -59,7 +60,11 @@ function Blade({ station }: { station: StationRef }) {
   const [{ replay }] = usePageSearch();
   return (
     <div className={`${classes.panels} bench`}>
-      {pmc && replay === undefined && <MotionPanel device={pmc} context={contexts.pmc} />}
+      {replay !== undefined ? (
+        <RecordedNote part="motion" />
+      ) : (
+        pmc && <MotionPanel device={pmc} context={contexts.pmc} />
+      )}
       <section className={`${classes.panel} ${classes.plots}`} aria-label={t("page.axis.machine")}>
         <h2>{t("page.axis.machine")}</h2>
         <StateDiagram state={axis?.state ?? null} stale={axis?.stale ?? true} />

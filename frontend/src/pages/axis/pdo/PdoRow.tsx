@@ -1,5 +1,5 @@
 import { ActionIcon } from "@mantine/core";
-import { IconChevronDown, IconPencil, IconShieldCheck } from "@tabler/icons-react";
+import { IconChevronDown, IconEye, IconPencil, IconShieldCheck } from "@tabler/icons-react";
 import type { Pdo, PdoFinding, PdoMappable, PdoSetup } from "../../../api/pdo";
 import { usePageSearch } from "../../../frame/search";
 import { useServerNow } from "../../../live/live";
@@ -29,7 +29,8 @@ interface Props {
 
 /** One PDO: when it goes, what it carries, and, opened, how both are changed. */
 export function PdoRow(props: Props) {
-  const { pdo, setup, edited, context, findings, operational } = props;
+  const { pdo, setup, edited, context, findings, operational, locked } = props;
+  const Icon = locked ? IconEye : IconPencil;
   const t = useTexts();
   const [{ pdo: opened }, update] = usePageSearch();
   const title = titleOfPdo(pdo);
@@ -50,11 +51,13 @@ export function PdoRow(props: Props) {
           size={40}
           disabled={setup === null}
           aria-expanded={open}
-          aria-label={t(open ? "page.pdo.close_editor" : "page.pdo.edit", { pdo: title })}
+          aria-label={t(open ? "page.pdo.close_editor" : locked ? "page.pdo.look" : "page.pdo.edit", {
+            pdo: title,
+          })}
           onClick={() => update({ pdo: open ? undefined : nameOf(pdo) })}
           data-testid={`edit-${nameOf(pdo)}`}
         >
-          {open ? <IconChevronDown size={19} aria-hidden /> : <IconPencil size={19} aria-hidden />}
+          {open ? <IconChevronDown size={19} aria-hidden /> : <Icon size={19} aria-hidden />}
         </ActionIcon>
       </header>
       {setup !== null && (

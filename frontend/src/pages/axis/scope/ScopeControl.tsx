@@ -40,13 +40,15 @@ export function ScopeControl({ line, draft, chosen, replayed, why, locked, onArm
   const stopping = useMutation({ mutationFn: scopeOrders.stop, onError: failed, onSettled: refresh });
   return (
     <>
-      <p className={classes.state} role="status" data-phase={line?.phase} data-testid="scope-state">
-        <i aria-hidden />
-        <span>
-          <strong>{t(`page.scope.state_${line?.phase ?? "idle"}`)}</strong>
-          <small className="dim">{line ? factsOf(line, t) : ""}</small>
-        </span>
-      </p>
+      {!replayed && (
+        <p className={classes.state} role="status" data-phase={line?.phase} data-testid="scope-state">
+          <i aria-hidden />
+          <span>
+            <strong>{t(`page.scope.state_${line?.phase ?? "idle"}`)}</strong>
+            <small className="dim">{line ? factsOf(line, t) : ""}</small>
+          </span>
+        </p>
+      )}
       {replayed ? (
         <span className={classes.lock} data-testid="scope-lock">
           <IconLock size={17} aria-hidden /> {t("page.scope.locked")}

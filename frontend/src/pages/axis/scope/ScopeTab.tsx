@@ -2,7 +2,7 @@ import { SegmentedControl, Tabs } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { useEffect, useRef, useState } from "react";
 import { useTurbineQuery } from "../../../api/queries";
-import { capturesQuery, isArmed, scopeQuery } from "../../../api/scope";
+import { capturesQuery, isArmed, scopeQuery, type ScopeLine } from "../../../api/scope";
 import { usePageSearch } from "../../../frame/search";
 import { useRole } from "../../../frame/role";
 import { useTexts } from "../../../texts/texts";
@@ -26,15 +26,16 @@ export function ScopeTab() {
   const t = useTexts();
   const [search, update] = usePageSearch();
   const turbine = useQuery(useTurbineQuery()).data;
-  const line = useQuery(scopeQuery).data;
+  const replayed = search.replay !== undefined;
+  const now = useQuery({ ...scopeQuery, enabled: !replayed }).data;
+  const line = replayed ? undefined : now; // what the bench measures now is not what was recorded
   const captures = useQuery(capturesQuery).data ?? [];
   const options = useOptions(search.blade);
   const role = useRole();
   const stations = (turbine?.stations ?? []).filter((one) => one.blade !== null);
   const station = stations.find((one) => String(one.blade) === search.blade) ?? stations[0];
   const [draft, setDraft] = useDraft(line?.order);
-  const [side, setSide] = useState<Side>("signals");
-  const replayed = search.replay !== undefined;
+  const [side, setSide] = useState<Side>(search.replay === undefined ? "signals" : "captures");
   const locked = replayed || !role.may("technician") || turbine === undefined;
   const chosen = chosenOf(search.channels, line?.order?.signals, turbine?.slug);
   const references = listOf(search.refs);
@@ -100,15 +101,25 @@ export function ScopeTab() {
             </Tabs.Panel>
           </Tabs>
         </aside>
-        <main className={classes.main}>
+        <section className={classes.main} aria-label={t("page.scope.shown")}>
           {search.capture === undefined ? (
-            <LiveView line={line} />
+            <Present line={line} replayed={replayed} />
           ) : (
             <CaptureView key={search.capture} id={search.capture} captures={captures} armed={isArmed(line)} />
           )}
-        </main>
+        </section>
       </div>
     </div>
+  );
+}
+
+function Present({ line, replayed }: { line: ScopeLine | undefined; replayed: boolean }) {
+  const t = useTexts();
+  if (!replayed) return <LiveView line={line} />;
+  return (
+    <p className={classes.empty} data-testid="scope-replayed">
+      {t("page.scope.empty_replay")}
+    </p>
   );
 }
 

@@ -30,7 +30,7 @@ export function SignalsPanel({ options, chosen, rates, station, locked, onChosen
   const byName = new Map(rates.map((one) => [one.name, one]));
   return (
     <div className={classes.panel}>
-      <h3>{t("page.scope.presets")}</h3>
+      <h2>{t("page.scope.presets")}</h2>
       <div className={classes.presets}>
         {PRESET_NAMES.map((preset) => (
           <Button
@@ -44,7 +44,7 @@ export function SignalsPanel({ options, chosen, rates, station, locked, onChosen
           </Button>
         ))}
       </div>
-      <h3>{t("page.scope.chosen", { count: chosen.length, limit: MAX_SIGNALS })}</h3>
+      <h2>{t("page.scope.chosen", { count: chosen.length, limit: MAX_SIGNALS })}</h2>
       {chosen.length === 0 && <p className={classes.told}>{t("page.scope.chosen_none")}</p>}
       <ul className={classes.chosen} data-testid="chosen-signals">
         {chosen.map((name, at) => {

@@ -11,6 +11,7 @@ import { OrderProblem } from "../../../motion/OrderProblem";
 import { RunButton } from "../../../motion/RunButton";
 import { useTexts } from "../../../texts/texts";
 import axis from "../Axis.module.css";
+import { RecordedNote } from "../RecordedNote";
 import type { Line } from "../signal/plotData";
 import { ResponsePlot } from "../signal/ResponsePlot";
 import { RunResults } from "../signal/RunResults";
@@ -41,7 +42,7 @@ export function ControllerPicture({ pmc }: PictureProps) {
         <p>{t("page.setup.controller.explain")}</p>
         <ControllerStructure pmc={pmc} />
       </section>
-      {!recorded && <Measure pmc={pmc} />}
+      {recorded ? <RecordedNote part="controller" /> : <Measure pmc={pmc} />}
     </div>
   );
 }

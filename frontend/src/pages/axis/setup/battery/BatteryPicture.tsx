@@ -1,6 +1,7 @@
 import axis from "../../Axis.module.css";
 import { useShown } from "../../../../live/live";
 import { useTexts } from "../../../../texts/texts";
+import { RecordedNote } from "../../RecordedNote";
 import type { PictureProps } from "../SetupTab";
 import classes from "./Battery.module.css";
 import { BatteryFacts } from "./BatteryFacts";
@@ -43,7 +44,7 @@ export function BatteryPicture({ pmm }: PictureProps) {
           ))}
         </div>
       </section>
-      {!recorded && <TestPanel slug={pmm.slug} />}
+      {recorded ? <RecordedNote part="battery" /> : <TestPanel slug={pmm.slug} />}
       {!recorded && <ChangePanel slug={pmm.slug} />}
     </div>
   );

@@ -5,6 +5,7 @@ import { shownOf } from "../../../../model/shown";
 import { useTexts } from "../../../../texts/texts";
 import { stage, useChange } from "../../../parameters/staging";
 import axis from "../../Axis.module.css";
+import { RecordedNote } from "../../RecordedNote";
 import type { PictureProps } from "../SetupTab";
 import { CheckMove } from "./CheckMove";
 import classes from "./Gear.module.css";
@@ -23,7 +24,7 @@ export function GearPicture({ pmc }: PictureProps) {
       <TrainPanel pmc={pmc} side={MOTOR} />
       <TrainPanel pmc={pmc} side={BLADE} />
       <Selection pmc={pmc} />
-      {!recorded && <CheckMove pmc={pmc} />}
+      {recorded ? <RecordedNote part="gear" /> : <CheckMove pmc={pmc} />}
     </div>
   );
 }

@@ -45,8 +45,14 @@ export function TrainPanel({ pmc, side }: { pmc: DeviceContext; side: Side }) {
       <h2>{title}</h2>
       <Drawing train={train} side={side} locked={recorded} onChange={change} />
       <p className="dim">{t("page.setup.gear.stages_note")}</p>
+      {recorded && whole === null && (
+        <p className="dim" data-testid={`not-recorded-${side.name}`}>
+          {t("page.axis.recorded.unknown")}
+        </p>
+      )}
       {Object.entries(parts).map(
         ([name, part]) =>
+          !recorded &&
           !part.ok && (
             <p key={name} className={classes.bad} role="alert" data-testid={`fault-${side.name}-${name}`}>
               {t(`page.setup.gear.part.${name}`)}: {t(`page.setup.gear.fault.${part.fault}`)}

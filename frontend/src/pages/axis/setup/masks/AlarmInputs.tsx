@@ -30,7 +30,7 @@ export function AlarmInputs({ unit, setup }: Props) {
   if (!bits) return null;
   return (
     <section className={classes.panel} aria-labelledby="setup-alarms">
-      <h3 id="setup-alarms">{t("page.setup.masks.alarms")}</h3>
+      <h2 id="setup-alarms">{t("page.setup.masks.alarms")}</h2>
       <p className="dim">{t("page.setup.masks.alarms_intro")}</p>
       <ol className={classes.alarms}>
         {parameters.map(

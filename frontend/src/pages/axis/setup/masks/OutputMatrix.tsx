@@ -46,7 +46,7 @@ export function OutputMatrix({ unit, setup, columns }: Props) {
   };
   return (
     <section className={classes.panel} aria-labelledby="setup-outputs">
-      <h3 id="setup-outputs">{t("page.setup.masks.outputs")}</h3>
+      <h2 id="setup-outputs">{t("page.setup.masks.outputs")}</h2>
       <p className="dim">{t("page.setup.masks.outputs_intro")}</p>
       <div className={classes.scroll}>
         <table

@@ -53,7 +53,7 @@ export function PositionRange({ unit, pmc, setup }: Props) {
   ];
   return (
     <section className={classes.panel} aria-labelledby="setup-range">
-      <h3 id="setup-range">{t("page.setup.masks.range.title")}</h3>
+      <h2 id="setup-range">{t("page.setup.masks.range.title")}</h2>
       <p className="dim">{t("page.setup.masks.range.intro")}</p>
       <div className={classes.range}>
         <svg viewBox="-150 -136 300 166" className={classes.arc} data-testid="range-arc">

@@ -21,7 +21,7 @@ export function PulseTest({ unit }: { unit: DeviceContext }) {
   const reading = useReading(unit, INPUTS, "slow");
   return (
     <section className={classes.panel} aria-labelledby="setup-pulse" data-testid="pulse-test">
-      <h3 id="setup-pulse">{t("page.setup.masks.pulse.title")}</h3>
+      <h2 id="setup-pulse">{t("page.setup.masks.pulse.title")}</h2>
       <p className={classes.only}>
         <IconEye size={17} aria-hidden /> {t("page.setup.masks.pulse.only")}
       </p>

@@ -79,7 +79,7 @@ function Place({ spot: { spot, lanes }, setup, pmm, pmc, scale }: PlaceProps) {
   const name = t(`page.temperature.${spot.key}`);
   return (
     <section className={classes.place} aria-label={name} data-testid={`place-${spot.key}`}>
-      <h3>
+      <h2>
         {name}
         <span className={classes.now}>
           <ReadingText
@@ -90,7 +90,7 @@ function Place({ spot: { spot, lanes }, setup, pmm, pmc, scale }: PlaceProps) {
             instead={(one) => sensorWords(one, t)}
           />
         </span>
-      </h3>
+      </h2>
       {lanes.map((lane) =>
         lane.kind === "supervisor" ? (
           <SupervisorRow
