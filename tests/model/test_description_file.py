@@ -10,7 +10,7 @@ import pytest
 from app.errors import DescriptionError, UnknownObjectError
 from app.model.address import Address
 from app.model.datatypes import DataType
-from app.model.description import Access, Description, Kind, LimitRef, RestoreClass, Verify
+from app.model.description import Access, Description, Fact, Kind, LimitRef, PdoSide, RestoreClass, Verify
 from app.model.description_file import load, problems
 from tests.model.conftest import TOY
 
@@ -126,3 +126,51 @@ def test_a_wrong_error_names_line_and_reason(tmp_path: Path, row: str, reason: s
     path.write_text(f"{TOY}\n[[error]]\ncode = 1\n{row}\n", encoding="utf-8")
     found = problems(path)
     assert [(one.line, reason in one.reason) for one in found] == [(TOY.count("\n") + 2, True)], [str(p) for p in found]
+
+
+def row_of(tmp_path: Path, keys: str, head: str = "") -> Path:
+    """The toy with one more object."""
+    path = tmp_path / "toy.toml"
+    row = 'index = 0x2999\nname = "more"\nsection = "1"\ngroup = "all"\ntype = "unsigned8"\naccess = "rw"'
+    path.write_text(f"{TOY}\n{head}\n[[object]]\n{row}\n{keys}\n", encoding="utf-8")
+    return path
+
+
+def test_facts_that_are_not_printed_and_their_source(tmp_path: Path) -> None:
+    head = '[[source]]\nid = "other"\ntitle = "Another manual"'
+    some = load(row_of(tmp_path, 'inferred = ["default", "sub"]\norigin = "other"', head)).entry(Address(0x2999))
+    assert (some.inferred, some.origin) == (True, "other")
+    assert [some.proves(fact) for fact in (Fact.DEFAULT, Fact.SUB, Fact.TYPE)] == [False, False, True]
+    whole = load(row_of(tmp_path, "inferred = true")).entry(Address(0x2999))
+    assert not any(whole.proves(fact) for fact in Fact)
+    printed = load(row_of(tmp_path, "")).entry(Address(0x2999))
+    assert all(printed.proves(fact) for fact in Fact)
+
+
+@pytest.mark.parametrize(("pdo", "side"), [('"rx"', PdoSide.RX), ('"tx"', PdoSide.TX), ("true", None)])
+def test_the_side_of_the_process_image(tmp_path: Path, pdo: str, side: PdoSide | None) -> None:
+    row = load(row_of(tmp_path, f"pdo = {pdo}")).entry(Address(0x2999))
+    assert (row.pdo, row.pdo_side) == (True, side)
+
+
+def test_objects_share_a_rule_of_units(tmp_path: Path) -> None:
+    head = '[[unit_rule]]\nid = "way"\naddress = "2002"\nchoices = { "0x10" = { unit = "mm" } }'
+    rule = load(row_of(tmp_path, 'unit_from = "way"', head)).entry(Address(0x2999)).quantity_rule
+    assert rule is not None
+    assert (rule.address, rule.choices[16].unit) == (Address(0x2002), "mm")
+
+
+@pytest.mark.parametrize(
+    ("keys", "reason"),
+    [
+        ('inferred = ["colour"]', "inferred is 'colour'"),
+        ('inferred = "yes"', "key 'inferred' is 'yes'"),
+        ('origin = "nowhere"', "source 'nowhere' does not exist"),
+        ('pdo = "both"', "neither true nor false"),
+        ('unit_from = "nothing"', "unit rule 'nothing' does not exist"),
+        ("by_variant = { big = { default = 300 } }", "does not fit UNSIGNED8"),
+    ],
+)
+def test_a_wrong_row_says_why(tmp_path: Path, keys: str, reason: str) -> None:
+    found = problems(row_of(tmp_path, keys))
+    assert any(reason in one.reason for one in found), [str(one) for one in found]

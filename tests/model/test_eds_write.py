@@ -22,6 +22,7 @@ from app.model.description import Access, Bus, Description, Entry, Kind, LimitRe
 from app.model.description_file import builtin_folder, load_builtin
 from app.model.eds import read_eds
 from app.model.eds_write import builtin_canopen, eds_name, to_eds, write_all
+from app.model.variant import as_variant
 
 COMMITTED = builtin_folder() / "eds"
 DCFCHK = Path(sys.executable).parent / ("dcfchk.exe" if sys.platform == "win32" else "dcfchk")
@@ -111,6 +112,27 @@ def test_our_own_reader_gives_back_what_was_written(device: str) -> None:
         assert seen.default == entry.default, entry.address
         plain = isinstance(entry.minimum, int) and not entry.also
         assert seen.minimum == (entry.minimum if plain else None), entry.address
+
+
+@pytest.mark.parametrize("variant", [None, *load_builtin("nanotec-pd4e").variants])
+def test_a_device_of_another_bus_has_one_that_all_readers_take(
+    variant: str | None, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    description = load_builtin("nanotec-pd4e")
+    description = description if variant is None else as_variant(description, variant)
+    text = to_eds(description)
+    dictionary = import_silently(text, 1, caplog)
+    assert len(list(dictionary)) == len(list(description.objects()))
+    assert not any(line.startswith("BaudRate") and line.endswith("=1") for line in text.splitlines())
+    path = tmp_path / "pd4e.eds"
+    path.write_bytes(text.encode("ascii"))
+    check_with_dcfchk(path)
+    loaded = read_eds(path.read_bytes(), path.name)
+    assert loaded.warnings == []
+    for entry in description:
+        seen = loaded.description.entry(entry.address)
+        assert (seen.type, seen.access, seen.pdo) == (entry.type, entry.access, entry.pdo), entry.address
+        assert seen.default == entry.default, entry.address
 
 
 def test_text_is_the_same_each_time_and_plain() -> None:

@@ -1,4 +1,4 @@
-"""The descriptions of PD4-E and ED2 hold what their manuals ask of the schema."""
+"""The description of ED2 holds what its manual asks of the schema."""
 
 from __future__ import annotations
 
@@ -7,58 +7,19 @@ from decimal import Decimal
 import pytest
 
 from app.errors import LimitError, PreconditionError, ValueTypeError
-from app.model.address import Address, parse_address
+from app.model.address import parse_address
 from app.model.checks import check_write, limits_of
 from app.model.datatypes import Raw
 from app.model.description import Access, Bus, Lookup
 from app.model.description_file import load_builtin
 from app.model.values import quantity_of
 
-PD4E = load_builtin("nanotec-pd4e")
 ED2 = load_builtin("wandfluh-ed2")
 
 
 def device_with(values: dict[str, Raw]) -> Lookup:
     known = {parse_address(address): raw for address, raw in values.items()}
     return known.get
-
-
-def test_pd4e_has_six_objects_and_speaks_modbus() -> None:
-    assert len(list(PD4E.objects())) == 6
-    assert PD4E.bus is Bus.MODBUS_TCP
-
-
-@pytest.mark.parametrize(
-    ("address", "defaults"),
-    [
-        ("1000", (0x00040192, 0x00040192, 0x00020192)),
-        ("2030", (50, 50, 3)),
-        ("2031", (2100, 2100, 6000)),
-        ("3202", (0, 0, 0x40)),
-        ("6073", (1000, 1000, 2000)),
-    ],
-)
-def test_pd4e_default_depends_on_the_variant(address: str, defaults: tuple[int, int, int]) -> None:
-    row = PD4E.entry(parse_address(address))
-    assert PD4E.variants == ("pd4-e591", "pd4-e601", "pd4-eb59")
-    assert tuple(row.variants[variant].default for variant in PD4E.variants) == defaults
-    assert row.default is None
-
-
-def test_pd4e_saves_by_category() -> None:
-    commands = {command.category: command.address for command in PD4E.save}
-    assert commands == {"drive": Address(0x1010, 5), "tuning": Address(0x1010, 6)}
-    saved = {row.address.major: row.save_category for row in PD4E if row.saved}
-    assert saved == {0x2030: "tuning", 0x2031: "tuning", 0x3202: "drive", 0x6073: "drive"}
-    assert set(saved.values()) <= commands.keys()
-
-
-def test_pd4e_submode_of_the_brushless_variant_is_its_named_bit() -> None:
-    row = PD4E.entry(Address(0x3202))
-    assert row.bits is not None
-    names = {bit.mask: bit.name for bit in PD4E.bit_tables[row.bits].bits}
-    assert names[0x01] == "closed_loop"
-    assert names[0x40] == "bldc"
 
 
 def test_ed2_has_six_parameters_addressed_by_ind_and_pnu() -> None:
