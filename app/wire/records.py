@@ -81,6 +81,16 @@ class Fault(Enum):
     """The CRC of a block transfer does not fit its data."""
     PDO_LENGTH = "pdo_length"
     """A PDO is shorter than its mapping."""
+    PROTOCOL = "protocol"
+    """The protocol identifier of a Modbus TCP header is not 0."""
+    FUNCTION = "function"
+    """A function code of Modbus that the device does not document."""
+    COUNT = "count"
+    """A count that does not fit its limits, or what it counts."""
+    FIELD = "field"
+    """A field has a value that the protocol does not know."""
+    OPTION = "option"
+    """An option that the device does not have."""
 
     @property
     def text_key(self) -> str:
