@@ -22,7 +22,7 @@ NO_REACTION = -1
 
 
 class Axis:
-    """The motor as operating modes see it. Positions of the motor are revolutions, velocities revolutions per second."""
+    """The motor as operating modes see it, in revolutions and revolutions per second."""
 
     def __init__(self, store: ObjectStore, servo: Servo) -> None:
         self.store = store
@@ -77,6 +77,11 @@ class Axis:
     def increments(self) -> int:
         """6063h: what the encoder has counted since power-on."""
         return round((self.servo.position - self.encoder_start) * self._per_turn)
+
+    @property
+    def following_error(self) -> int:
+        """60F4h: wanted less actual position, in position units."""
+        return self.user_position(self.reference.position) - self.user_position(self.measured)
 
     @property
     def _per_turn(self) -> float:

@@ -45,12 +45,11 @@ _HALTING: Final = (
 OVER_TEMPERATURE_C: Final = 80.0
 """Sibling drives switch off here."""
 OVER_VOLTAGE_MV: Final = 51_500
-"""Manual, 3.6.3."""
+"""Manual, 3.6.3, where 2034h does not tell."""
 _AMBIENT_C: Final = 25.0
 _WARMTH_K: Final = 30.0
 """Above the ambient with the rated current for ever (assumed)."""
 _WARMING_MS: Final = 300_000.0
-_STARTS: Final = {State.SWITCHED_ON, State.READY, State.SWITCH_ON_DISABLED}
 
 
 @dataclass(slots=True)
@@ -76,16 +75,20 @@ class Drive:
         self._saving = saving
         self._homing = Homing(self.axis)
         self._velocity = ProfileVelocity(self.axis)
-        self._torque = Torque(self.axis)
+        converter = Velocity(self.axis)
+        self.velocity_factor: Callable[[], float] = lambda: converter.factor
+        """604Ch, by which 6042h to 6044h are divided."""
+        self.setup_ended: Callable[[], None] = lambda: None
+        """Called when the auto set-up has ended: the device stores what it found."""
         self.setup = AutoSetup(self.axis)
         self._modes: dict[ModeCode, Mode] = {
             ModeCode.AUTO_SETUP: self.setup,
             ModeCode.CLOCK_DIRECTION: Hold(self.axis),
             ModeCode.NONE: Hold(self.axis),
             ModeCode.PROFILE_POSITION: ProfilePosition(self.axis),
-            ModeCode.VELOCITY: Velocity(self.axis),
+            ModeCode.VELOCITY: converter,
             ModeCode.PROFILE_VELOCITY: self._velocity,
-            ModeCode.PROFILE_TORQUE: self._torque,
+            ModeCode.PROFILE_TORQUE: Torque(self.axis),
             ModeCode.HOMING: self._homing,
             ModeCode.INTERPOLATED_POSITION: InterpolatedPosition(self.axis),
             ModeCode.CYCLIC_POSITION: CyclicPosition(self.axis),
@@ -261,10 +264,15 @@ class Drive:
     def _holds(self, trouble: Trouble) -> bool:
         """Whether the cause of a fault is still there."""
         if trouble is Trouble.OVER_VOLTAGE:
-            return self.conditions.supply_mv > OVER_VOLTAGE_MV
+            return self.conditions.supply_mv > self._most_mv
         if trouble is Trouble.UNDER_VOLTAGE:
             return self.conditions.supply_mv < self._least_mv
         return trouble is Trouble.OVER_TEMPERATURE and self.temperature_c >= OVER_TEMPERATURE_C
+
+    @property
+    def _most_mv(self) -> int:
+        cell = self.store.find(0x2034)
+        return OVER_VOLTAGE_MV if cell is None else cell.number
 
     @property
     def _least_mv(self) -> int:
@@ -304,7 +312,7 @@ class Drive:
 
     def _watch_surroundings(self) -> None:
         supply = self.conditions.supply_mv
-        if supply > OVER_VOLTAGE_MV:
+        if supply > self._most_mv:
             self._fail(Trouble.OVER_VOLTAGE, None)
         elif supply < self._least_mv:
             self._fail(Trouble.UNDER_VOLTAGE, None)
@@ -329,7 +337,7 @@ class Drive:
 
     def _watch_course(self) -> None:
         if self.mode_code in _WATCHED_POSITION:
-            error = abs(self.axis.user_position(self.axis.reference.position) - self.axis.user_position(self.axis.measured))
+            error = abs(self.axis.following_error)
             window = self.store.number(0x6065)
             exceeded = window != OFF_32 and error > window
             self._following_ms = self._following_ms + 1 if exceeded else 0
@@ -342,9 +350,6 @@ class Drive:
         if self.setup.finished:
             self.setup.finished = False
             self.setup_ended()
-
-    def setup_ended(self) -> None:
-        """The auto set-up has ended; the device stores what it found."""
 
     def _deviate(self, trouble: Trouble) -> None:
         """Following or slippage error: bit 13 and the action of 3700h. OPEN for -1; here only the bit shows then."""

@@ -24,8 +24,8 @@ class Trouble(Enum):
     NEGATIVE_LIMIT = (11, 0x20, 0x8612, False)
     OVER_TEMPERATURE = (12, 0x08, 0x4200, True)
     FOLLOWING_ERROR = (13, 0x20, 0x8611, True)
-    MEMORY = (16, 0x01, 0x1000, False)
-    SLIPPAGE = (22, 0x20, 0x8400, True)
+    MEMORY = (16, 0x01, 0x7600, False)
+    SLIPPAGE = (30, 0x20, 0x8400, True)
 
     def __init__(self, number: int, kind: int, code: int, fault: bool) -> None:
         self.entry = number << 24 | kind << 16 | code

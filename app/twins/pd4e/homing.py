@@ -2,8 +2,8 @@
 
 A method ends at an edge of the reference or of a limit switch, passed in one direction, and, for the ones with index,
 at the index that follows. The known parts of the manual name 3 to 6, 11 to 14, 17 to 22, 27 to 30 and 33 to 35; the
-others are those of CiA 402. The numbers of homing on block are those of sibling drives: the negative of a method that
-uses a limit switch, with the block in its place.
+others are those of CiA 402. The numbers of homing on block are those of sibling drives: the negative of a method
+that ends at a limit switch, with the block in its place.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ def plan_of(method: int) -> Plan | None:
     with_index = number <= _WITHOUT_INDEX
     base = (_TO_SWITCH | _TO_LIMIT).get(number if with_index else number - _WITHOUT_INDEX)
     if base is not None:
-        if method < 0 and not (base.limit or base.turns):
+        if method < 0 and not base.limit:
             return None
         return Plan(
             base.search, base.leaves, base.enters, with_index, base.limit, base.turns, block=method < 0, here=False

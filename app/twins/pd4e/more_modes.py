@@ -1,4 +1,4 @@
-"""Operating modes with torque, homing, interpolation and cyclic set-points, and the auto set-up (manual, 6.4 to 6.11)."""
+"""Operating modes beyond ramps: torque, homing, cyclic set-points, auto set-up (manual, 6.4 to 6.11)."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """The motor on its load: current, speed and position of the shaft, one step a millisecond. Pure; SI and revolutions.
 
-One mass with dry friction, a current that follows at once within its limit, and a speed controller that fits it. The
-gains 3210h have no printed unit and no part in it. In open loop the same controller stands for the stepping field:
+One mass with dry friction, a current that follows at once within its limit, and a speed controller that fits it and
+learns the torque of the load from how the shaft moves. The gains 3210h have no printed unit and no part in it. In open loop the same controller stands for the stepping field:
 lost steps are not simulated.
 """
 
@@ -19,7 +19,8 @@ _SPEED_S: Final = 0.004
 """Time constant of the speed controller."""
 _POSITION_PER_S: Final = 50.0
 """Gain of the position controller."""
-_INTEGRAL_PER_S: Final = 40.0
+_LEARNING_S: Final = 0.01
+"""Time constant with which the load is learnt."""
 _STILL_REV_S: Final = 0.002
 
 
@@ -90,7 +91,7 @@ class Servo:
         """The current was at its limit in the last cycle."""
         self.crossed_index = False
         """The index passed in the last cycle."""
-        self._integral_ma = 0.0
+        self._against_load_ma = 0.0
         self._per_rev_s2 = motor.inertia_kgm2 * _TURN_RAD / motor.torque_nm * motor.rated_ma
         self._friction_ma = motor.friction_nm / motor.torque_nm * motor.rated_ma
 
@@ -101,7 +102,7 @@ class Servo:
 
     def release(self) -> None:
         """Take the current away."""
-        self.current_ma = self._integral_ma = 0.0
+        self.current_ma = self._against_load_ma = 0.0
         self.limited = False
 
     def step(self, control: Control, position: float, velocity: float, acceleration: float, limit_ma: float) -> None:
@@ -109,7 +110,7 @@ class Servo:
         if control is Control.OFF:
             self.release()
         elif control is Control.CURRENT:
-            self.current_ma, self._integral_ma, self.limited = limit_ma, 0.0, False
+            self.current_ma, self._against_load_ma, self.limited = limit_ma, 0.0, False
         else:
             self.current_ma = self._speed_control(control, position, velocity, acceleration, limit_ma)
         self._move()
@@ -122,12 +123,9 @@ class Servo:
             wanted += _POSITION_PER_S * (position - self.position)
         error = wanted - self.velocity
         friction = copysign(self._friction_ma, wanted) if abs(wanted) > _STILL_REV_S else 0.0
-        current = self._per_rev_s2 * (acceleration + error / _SPEED_S) + friction + self._integral_ma
+        self._against_load_ma = min(max(self._against_load_ma, -limit_ma), limit_ma)
+        current = self._per_rev_s2 * (acceleration + error / _SPEED_S) + friction + self._against_load_ma
         self.limited = abs(current) > limit_ma
-        # What is limited is not integrated any further, else the controller would have to unwind.
-        if not self.limited or current * error < 0.0:
-            self._integral_ma += self._per_rev_s2 * error / _SPEED_S * _INTEGRAL_PER_S * CYCLE_S
-            self._integral_ma = min(max(self._integral_ma, -limit_ma), limit_ma)
         return min(max(current, -limit_ma), limit_ma)
 
     def _move(self) -> None:
@@ -135,12 +133,23 @@ class Servo:
         pushed = self.velocity + torque / (self.motor.inertia_kgm2 * _TURN_RAD) * CYCLE_S
         friction = self.motor.friction_nm / (self.motor.inertia_kgm2 * _TURN_RAD) * CYCLE_S
         now = slowed(pushed, friction)
+        self._learn_load(now)
         before = self.position
         self.position += (self.velocity + now) / 2 * CYCLE_S
         self.velocity = now
         self._stop_at_ends()
         index = self.bench.index
         self.crossed_index = floor(before - index) != floor(self.position - index)
+
+    def _learn_load(self, now: float) -> None:
+        """What the motor must give besides speeding up: its current, less what the change of speed and friction took.
+
+        A shaft that is held gives no hint; then the current stays, and grows as long as something is wanted.
+        """
+        moved = self._per_rev_s2 * (now - self.velocity) / CYCLE_S
+        rubbed = copysign(self._friction_ma, now) if now else 0.0
+        needed = self.current_ma - moved - rubbed
+        self._against_load_ma += (needed - self._against_load_ma) * CYCLE_S / _LEARNING_S
 
     def _stop_at_ends(self) -> None:
         low, high = self.bench.low_stop, self.bench.high_stop
