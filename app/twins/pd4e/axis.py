@@ -17,6 +17,8 @@ _TORQUE_ONLY = 0x20
 """Bit of 3202h: no speed limit in the torque modes."""
 _RAMP_KINDS = 3
 """6086h: jerk-limited ramps."""
+_PATIENCE_MS = 1000
+"""How long a shaft that does not come to rest is waited for after the ramp has ended (assumed)."""
 NO_REACTION = -1
 """3701h and 3700h: nothing happens."""
 
@@ -42,6 +44,7 @@ class Axis:
         self.units: Units = units_of(store)
         self._how: How | None = None
         self._deceleration = inf
+        self._waited_ms = 0
         self._ramps: Callable[[How], float] = lambda _how: inf
 
     # -- user units ------------------------------------------------------------------------
@@ -146,6 +149,7 @@ class Axis:
         self.control = control
         self._ramps = ramps
         self._how = None
+        self._waited_ms = 0
         self.reference.put(self.servo.position, 0.0 if self.servo.still else self.servo.velocity)
 
     def release(self) -> None:
@@ -158,6 +162,7 @@ class Axis:
     def stop(self, how: How) -> None:
         """Come to rest, and stay so until ``operate`` or ``go_on``."""
         self._how = how
+        self._waited_ms = 0
         self._deceleration = inf if how is How.AT_ONCE else self._ramps(how)
         if self._deceleration <= 0.0:
             self._deceleration = inf  # a ramp of 0 would never end
@@ -179,14 +184,17 @@ class Axis:
 
     @property
     def at_rest(self) -> bool:
-        """The commanded stop has ended, or there is no current."""
-        return self.control is Control.OFF or (self.reference.velocity == 0.0 and self.servo.still)
+        """The commanded stop has ended, or there is no current. A shaft that is dragged along is waited for a while."""
+        if self.control is Control.OFF:
+            return True
+        return self.reference.velocity == 0.0 and (self.servo.still or self._waited_ms >= _PATIENCE_MS)
 
     def step(self, limit_ma: float) -> None:
         """One millisecond of the motor."""
         reference = self.reference
         if self._how is not None and self.control is not Control.OFF:
             reference.run(0.0, self._deceleration, self._deceleration)
+            self._waited_ms = self._waited_ms + 1 if reference.velocity == 0.0 else 0
         elif self.barred and reference.velocity * self.barred > 0.0:
             reference.put(self.servo.position)
         limit = self.wanted_ma if self.control is Control.CURRENT else limit_ma

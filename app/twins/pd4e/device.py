@@ -21,7 +21,7 @@ from app.twins.pd4e.modes import ModeCode
 from app.twins.pd4e.nanoj import NanoJ
 from app.twins.pd4e.process_data import ProcessData
 from app.twins.pd4e.saving import Saving
-from app.twins.pd4e.servo import Bench, Motor, Servo
+from app.twins.pd4e.servo import Bench, Control, Motor, Servo
 from app.twins.state_file import StateFile
 from app.wire.sdo import Abort
 
@@ -118,6 +118,7 @@ class Pd4e:
     def _cycle(self) -> None:
         if self._booted_ns is not None:
             if self.now_ns < self._booted_ns:
+                self.servo.step(Control.OFF, 0.0, 0.0, 0.0, 0.0)  # a shaft that turns runs out
                 return
             self._booted_ns = None
             self.drive.states.booted()

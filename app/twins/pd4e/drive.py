@@ -216,9 +216,7 @@ class Drive:
 
     def _pass_on(self, word: int, rising: int) -> None:
         if self.states.obeying:
-            taken_back = self.mode.command(word, rising)
-            if taken_back:
-                self.store.cell(0x6040).raw = word & ~taken_back
+            self.mode.command(word, rising)
         elif self.mode_code is ModeCode.HOMING and rising & Word.NEW_SET_POINT:
             self._homing.start_where_it_stands()
 

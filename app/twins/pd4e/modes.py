@@ -18,6 +18,9 @@ OFF_32: Final = 0xFFFFFFFF
 CHANGE_AT_ONCE: Final = 1 << 5
 RELATIVE: Final = 1 << 6
 CHANGE_ON_SET_POINT: Final = 1 << 9
+_RESET_WHEN_REACHED: Final = 1
+_RESET_WHEN_TAKEN: Final = 2
+"""60F2h bits 4 and 5, as CiA 402 has them."""
 
 
 class ModeCode(IntEnum):
@@ -46,8 +49,8 @@ class Mode(Protocol):
     def begin(self) -> None:
         """The drive begins to follow this mode, at rest or not."""
 
-    def command(self, word: int, rising: int) -> int:
-        """A controlword has come, ``rising`` are the bits that rose. Gives the bits that the drive resets itself."""
+    def command(self, word: int, rising: int) -> None:
+        """A controlword has come, ``rising`` are the bits that rose."""
 
     def cycle(self) -> None:
         """One millisecond of set-points."""
@@ -71,10 +74,8 @@ class Hold:
     def begin(self) -> None:
         """Nothing is remembered."""
 
-    def command(self, word: int, rising: int) -> int:
+    def command(self, word: int, rising: int) -> None:
         """Nothing to obey."""
-        del word, rising
-        return 0
 
     def cycle(self) -> None:
         """Come to rest and hold."""
@@ -136,19 +137,21 @@ class ProfilePosition(Hold):
         self._last = self.axis.user_position(self.axis.reference.position)
         self._within, self._limited = True, False
 
-    def command(self, word: int, rising: int) -> int:
-        """Bit 4 hands a target over; the drive may reset it itself (60F2h bits 4 and 5)."""
+    def command(self, word: int, rising: int) -> None:
+        """Bit 4 hands a target over."""
         self._passes = bool(word & CHANGE_ON_SET_POINT)
         if rising & Word.NEW_SET_POINT:
             self._take(word)
-        if not word & Word.NEW_SET_POINT:
+            self._take_bit_back(_RESET_WHEN_TAKEN)
+        elif not word & Word.NEW_SET_POINT:
             self._points.withdraw()
-            return 0
-        option = self.store.number(0x60F2) >> 4 & 0x3
-        if option == 2 or (option == 1 and self._points.reached):
+
+    def _take_bit_back(self, when: int) -> None:
+        """The drive resets bit 4 itself where 60F2h bits 4 and 5 want that (manual, 6.1.2)."""
+        cell = self.store.cell(0x6040)
+        if self.store.number(0x60F2) >> 4 & 0x3 == when and cell.number & Word.NEW_SET_POINT:
+            cell.raw = cell.number & ~Word.NEW_SET_POINT
             self._points.withdraw()
-            return int(Word.NEW_SET_POINT)
-        return 0
 
     def _take(self, word: int) -> None:
         axis = self.axis
@@ -195,6 +198,8 @@ class ProfilePosition(Hold):
             target.position, target.velocity, target.acceleration, target.deceleration, passing
         ) and not (self._points.reached and self._points.last):
             self._points.arrive()
+            if self._points.reached:
+                self._take_bit_back(_RESET_WHEN_REACHED)
         error = abs(axis.user_position(axis.measured) - axis.user_position(target.position))
         window = self.store.number(0x6067)
         within = window == OFF_32 or self._window.holds(error, window, self.store.number(0x6068))

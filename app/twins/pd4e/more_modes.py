@@ -118,13 +118,12 @@ class Homing(Hold):
         self._run = None
         self._attained = self._failed = False
 
-    def command(self, word: int, rising: int) -> int:
+    def command(self, word: int, rising: int) -> None:
         """Start on a rising bit 4, give up where it falls."""
         if rising & Word.NEW_SET_POINT:
             self.start()
         elif not word & Word.NEW_SET_POINT:
             self._run = None
-        return 0
 
     def start(self) -> None:
         """Begin the method of 6098h. One that does not exist is an error."""
@@ -255,11 +254,9 @@ class InterpolatedPosition(CyclicPosition):
         super().begin()
         self._enabled = False
 
-    def command(self, word: int, rising: int) -> int:
+    def command(self, word: int, rising: int) -> None:
         """Bit 4 enables."""
-        del rising
         self._enabled = bool(word & Word.NEW_SET_POINT)
-        return 0
 
     def _wanted(self) -> float:
         return float(self.store.number(0x60C1, 1))
@@ -312,12 +309,10 @@ class AutoSetup(Hold):
         """Not started."""
         self._left, self._done, self.finished = 0, False, False
 
-    def command(self, word: int, rising: int) -> int:
+    def command(self, word: int, rising: int) -> None:
         """Start once."""
-        del word
         if rising & Word.NEW_SET_POINT and not self._left:
             self._left, self._done = _SETUP_CYCLES, False
-        return 0
 
     def cycle(self) -> None:
         """Forth in the first half, back in the second."""

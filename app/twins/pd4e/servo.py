@@ -1,8 +1,8 @@
 """The motor on its load: current, speed and position of the shaft, one step a millisecond. Pure; SI and revolutions.
 
 One mass with dry friction, a current that follows at once within its limit, and a speed controller that fits it and
-learns the torque of the load from how the shaft moves. The gains 3210h have no printed unit and no part in it. In open loop the same controller stands for the stepping field:
-lost steps are not simulated.
+learns the torque of the load from how the shaft moves. The gains 3210h have no printed unit and no part in it. In open
+loop the same controller stands for the stepping field: lost steps are not simulated.
 """
 
 from __future__ import annotations

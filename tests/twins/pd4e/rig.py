@@ -1,4 +1,4 @@
-"""A twin behind a real TCP port, with a clock that the test drives, and a client that speaks plain Modbus over a socket."""
+"""A twin behind a real TCP port, with a clock that the test drives, and a client on a plain socket."""
 
 from __future__ import annotations
 
