@@ -57,12 +57,36 @@ class Access(Enum):
 
 
 class RestoreClass(Enum):
-    """Where a value of a parameter set may be written back to."""
+    """Where a value of a parameter set may be written back to.
+
+    ``COPY``: any machine of this kind. ``UNIT``: the same machine only. ``FACTORY``: by the maker. ``NETWORK``: no
+    machine by itself; it decides at which address the device is found, and the wrong value cuts the connection.
+    """
 
     COPY = "copy"
     UNIT = "unit"
     FACTORY = "factory"
+    NETWORK = "network"
     NEVER = "never"
+
+
+class PdoSide(Enum):
+    """Which process image an object may stand in: what the device receives, or what it transmits."""
+
+    RX = "rx"
+    TX = "tx"
+
+
+class Fact(Enum):
+    """What a manual tells of one entry, each for itself, and where it fails to."""
+
+    SUB = "sub"
+    NAME = "name"
+    TYPE = "type"
+    ACCESS = "access"
+    PDO = "pdo"
+    DEFAULT = "default"
+    SAVED = "saved"
 
 
 class Verify(Enum):
@@ -141,10 +165,14 @@ class Bit:
 
 @dataclass(frozen=True, slots=True)
 class BitTable:
-    """Names of the bits of an object. Bits that are not named are reserved."""
+    """Names of the bits of an object. Bits that are not named are reserved.
+
+    ``origin`` is the source of what the device's own manual does not tell.
+    """
 
     id: str
     bits: tuple[Bit, ...]
+    origin: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,11 +186,15 @@ class EnumValue:
 
 @dataclass(frozen=True, slots=True)
 class Enumeration:
-    """Names of values. Where ``exclusive``, no other value may be written; else others are plain numbers."""
+    """Names of values. Where ``exclusive``, no other value may be written; else others are plain numbers.
+
+    ``origin`` is the source of what the device's own manual does not tell.
+    """
 
     id: str
     values: tuple[EnumValue, ...]
     exclusive: bool = True
+    origin: str | None = None
 
     def by_value(self, value: int) -> EnumValue | None:
         """The named value, or None."""
@@ -175,7 +207,8 @@ class ErrorCode:
 
     ``aid`` names the texts of its cause and of first aid: those of a family where several codes tell the same
     (battery bloc 1 to 8), of the device where another one means something else by the same name; else ``name``.
-    ``number`` is its number in the family and fills the placeholder {number} of the texts.
+    ``number`` is its number in the family and fills the placeholder {number} of the texts. ``origin`` is the source of
+    a code that the device's own manual does not tell.
     """
 
     code: int
@@ -184,6 +217,7 @@ class ErrorCode:
     reaction: str = ""
     aid: str = ""
     number: int | None = None
+    origin: str | None = None
 
     @property
     def cause_key(self) -> str:
@@ -211,7 +245,8 @@ class Entry:
 
     ``default``, ``minimum``, ``maximum`` and ``also`` (values allowed beyond the limits) are raw values. Where
     ``node_id``, the node's number is added to the default ($NODEID of CiA 306). ``inferred`` marks what the manual does
-    not print; ``motion`` an object whose write can set an axis in motion; ``counts`` one that the device itself counts
+    not print, ``unproven`` the facts that it does not print (empty where it is all of them), and ``origin`` the source
+    that they come from instead, if there is one; ``pdo_side`` the process image it may stand in; ``motion`` an object whose write can set an axis in motion; ``counts`` one that the device itself counts
     on, so that no old value is put back. An emergency feather command puts the value of ``overwritten_by`` into it, in
     RAM. ``line`` is the row's line in its file.
     """
@@ -242,6 +277,9 @@ class Entry:
     variants: Mapping[str, VariantValues] = field(default_factory=dict)
     note: str | None = None
     inferred: bool = False
+    unproven: frozenset[Fact] = frozenset()
+    origin: str | None = None
+    pdo_side: PdoSide | None = None
     timeout_s: float | None = None
     hexadecimal: bool = False
     node_id: bool = False
@@ -254,6 +292,10 @@ class Entry:
     def is_parameter(self) -> bool:
         """True for what is saved and can be set: no counters, no process values."""
         return self.saved and self.restore is not RestoreClass.NEVER
+
+    def proves(self, fact: Fact) -> bool:
+        """True where the device's own manual prints the fact."""
+        return not self.inferred or bool(self.unproven) and fact not in self.unproven
 
     @property
     def title(self) -> str:
@@ -284,6 +326,23 @@ class Match:
     product_code: int | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class Variant:
+    """One of several devices that share a description, and how it is told from the others."""
+
+    id: str
+    name: str
+    match: Match = Match()
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """Where facts come from that the device's own manual does not tell. ``title`` is that of the document."""
+
+    id: str
+    title: str
+
+
 @dataclass(frozen=True)
 class Description:
     """A device: all its entries in the order of their addresses, its tables and commands."""
@@ -304,6 +363,8 @@ class Description:
     save: tuple[SaveCommand, ...]
     load: tuple[SaveCommand, ...]
     variants: tuple[str, ...] = ()
+    variant_details: Mapping[str, Variant] = field(default_factory=dict)
+    sources: Mapping[str, Source] = field(default_factory=dict)
 
     def __iter__(self) -> Iterator[Entry]:
         return iter(self.entries.values())

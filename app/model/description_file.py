@@ -29,15 +29,19 @@ from app.model.description import (
     Enumeration,
     EnumValue,
     ErrorCode,
+    Fact,
     Kind,
     Limit,
     LimitRef,
     Match,
     Mirror,
+    PdoSide,
     Quantity,
     QuantityRule,
     RestoreClass,
     SaveCommand,
+    Source,
+    Variant,
     VariantValues,
     Verify,
 )
@@ -52,17 +56,18 @@ BUILTIN: Final = {
 }
 
 _TOP_KEYS: Final = frozenset(
-    "schema id version name vendor bus addressing manual match save load variant group bit_table enumeration error "
+    "schema id version name vendor bus addressing manual match save load variant source unit_rule group bit_table enumeration error "
     "object".split()
 )
-_ERROR_KEYS: Final = frozenset(("code", "name", "reaction", "aid", "number"))
+_ERROR_KEYS: Final = frozenset(("code", "name", "reaction", "aid", "number", "origin"))
 _OWN_KEYS: Final = frozenset(("index", "ind", "pnu", "kind", "subs", "elements"))
 _ROW_KEYS: Final = frozenset(
     "name section group type access pdo default saved save_category unit scale hex unit_from min max enumeration bits "
-    "restore verify requires mirror by_variant note inferred timeout_s node_id motion also counts "
+    "restore verify requires mirror by_variant note inferred origin timeout_s node_id motion also counts "
     "overwritten_by".split()
 )
-_NOT_INHERITED_BY_SUB0: Final = _ROW_KEYS - {"section", "group", "saved", "save_category", "inferred"}
+_NOT_INHERITED_BY_SUB0: Final = _ROW_KEYS - {"section", "group", "saved", "save_category", "inferred", "origin"}
+_PDO_SIDES: Final = frozenset(side.value for side in PdoSide)
 _E = TypeVar("_E", bound=Enum)
 
 
@@ -132,6 +137,7 @@ class _Reader:
         self._lines = lines
         self.problems: list[Problem] = []
         self._addressing = Addressing.OD
+        self._unit_rules: Mapping[str, QuantityRule] = {}
 
     def _say(self, line: int, reason: str) -> None:
         self.problems.append(Problem(self._file, line, reason))
@@ -151,6 +157,7 @@ class _Reader:
         except _WrongError as error:
             self._say(1, str(error))
             return None
+        self._unit_rules = dict(self._tables("unit_rule", _named_rule))
         description = Description(
             **head,
             bus=bus,
@@ -164,6 +171,8 @@ class _Reader:
             save=tuple(self._tables("save", _save_command)),
             load=tuple(self._tables("load", _save_command)),
             variants=tuple(str(variant.get("id")) for variant in data.get("variant", ())),
+            variant_details={one.id: one for one in self._tables("variant", _variant_detail)},
+            sources={one.id: one for one in self._tables("source", _source)},
         )
         self._cross_check(description)
         return description
@@ -237,13 +246,13 @@ class _Reader:
             kind=kind,
             type=data_type,
             access=_enum(Access, row.get("access"), "access"),
-            pdo=_bool(row, "pdo"),
+            pdo=row.get("pdo") in _PDO_SIDES or _bool(row, "pdo"),
             default=default,
             saved=_bool(row, "saved"),
             group=_text(row, "group"),
             section=_text(row, "section"),
             quantity=_quantity(row),
-            quantity_rule=_quantity_rule(row.get("unit_from")),
+            quantity_rule=self._rule(row.get("unit_from")),
             minimum=_limit(row.get("min")),
             maximum=_limit(row.get("max")),
             also=tuple(row.get("also", ())),
@@ -258,7 +267,10 @@ class _Reader:
             mirror=_mirror(row.get("mirror")),
             variants={name: _variant(values) for name, values in row.get("by_variant", {}).items()},
             note=f"note.{self._data['id']}.{note}" if note else None,
-            inferred=_bool(row, "inferred"),
+            inferred=bool(row.get("inferred")),
+            unproven=_unproven(row.get("inferred", False)),
+            origin=_text(row, "origin") if "origin" in row else None,
+            pdo_side=PdoSide(row["pdo"]) if row.get("pdo") in _PDO_SIDES else None,
             timeout_s=None if timeout is None else float(timeout),
             hexadecimal=_bool(row, "hex"),
             node_id=_bool(row, "node_id"),
@@ -268,13 +280,30 @@ class _Reader:
             line=line,
         )
 
+    def _rule(self, value: Mapping[str, Any] | str | None) -> QuantityRule | None:
+        """``unit_from``: a rule of its own, or the name of one that several objects share."""
+        if not isinstance(value, str):
+            return _quantity_rule(value)
+        if value not in self._unit_rules:
+            raise _WrongError(f"unit rule '{value}' does not exist")
+        return self._unit_rules[value]
+
     def _cross_check(self, description: Description) -> None:
         for entry in description:
             for reason in _contradictions(description, entry):
                 self._say(entry.line, f"{entry.address.short}: {reason}")
-        for number, command in enumerate(description.save):
-            if command.address not in description.entries:
-                self._say(self._lines.table("save", number), f"save address {command.address} is no object")
+        for key, commands in (("save", description.save), ("load", description.load)):
+            for number, command in enumerate(commands):
+                if command.address not in description.entries:
+                    self._say(self._lines.table(key, number), f"{key} address {command.address} is no object")
+        for key, told in (
+            ("bit_table", description.bit_tables),
+            ("enumeration", description.enumerations),
+            ("error", description.errors),
+        ):
+            for number, table in enumerate(told.values()):
+                if table.origin is not None and table.origin not in description.sources:
+                    self._say(self._lines.table(key, number), f"source '{table.origin}' does not exist")
 
 
 def _contradictions(description: Description, entry: Entry) -> Iterator[str]:
@@ -285,6 +314,8 @@ def _contradictions(description: Description, entry: Entry) -> Iterator[str]:
         yield f"enumeration '{entry.enumeration}' does not exist"
     if entry.group not in description.groups:
         yield f"group '{entry.group}' does not exist"
+    if entry.origin is not None and entry.origin not in description.sources:
+        yield f"source '{entry.origin}' does not exist"
     if unknown := entry.variants.keys() - set(description.variants):
         yield f"variant '{min(unknown)}' does not exist"
     for what, address in _references(entry):
@@ -292,6 +323,7 @@ def _contradictions(description: Description, entry: Entry) -> Iterator[str]:
             yield f"{what} refers to {address.short}, which is no object here"
     if entry.access is not Access.RW and entry.access is not Access.WO and entry.restore in (RestoreClass.COPY,):
         yield f"restore class '{entry.restore.value}' on an object that cannot be written ({entry.access.value})"
+    yield from _misfits(entry)
     low, high = entry.minimum, entry.maximum
     if isinstance(entry.default, int) and not entry.inferred and entry.default not in entry.also:
         if isinstance(low, int) and entry.default < low:
@@ -300,6 +332,16 @@ def _contradictions(description: Description, entry: Entry) -> Iterator[str]:
             yield f"default {entry.default} is above the maximum {high}"
     if isinstance(low, int) and isinstance(high, int) and low > high:
         yield f"minimum {low} is above the maximum {high}"
+
+
+def _misfits(entry: Entry) -> Iterator[str]:
+    """Defaults of variants that their type cannot hold."""
+    for variant, values in entry.variants.items():
+        if values.default is not None:
+            try:
+                encode_raw(entry.type, values.default)
+            except ValueError as error:
+                yield f"default {values.default!r} of variant '{variant}' does not fit {entry.type.name}: {error}"
 
 
 def _references(entry: Entry) -> Iterator[tuple[str, Address]]:
@@ -357,7 +399,7 @@ def _bit_table(table: Mapping[str, Any]) -> BitTable:
         if covered & bit.mask:
             raise _WrongError(f"bit {bit.bit} of table '{name}' stands twice")
         covered |= bit.mask
-    return BitTable(name, bits)
+    return BitTable(name, bits, table.get("origin"))
 
 
 def _enumeration(table: Mapping[str, Any]) -> Enumeration:
@@ -368,7 +410,7 @@ def _enumeration(table: Mapping[str, Any]) -> Enumeration:
     numbers = [value.value for value in values]
     if len(set(numbers)) != len(numbers):
         raise _WrongError(f"a value of enumeration '{name}' stands twice")
-    return Enumeration(name, values, bool(table.get("exclusive", True)))
+    return Enumeration(name, values, bool(table.get("exclusive", True)), table.get("origin"))
 
 
 def _error_code(table: Mapping[str, Any]) -> ErrorCode:
@@ -382,6 +424,7 @@ def _error_code(table: Mapping[str, Any]) -> ErrorCode:
         reaction=str(table.get("reaction", "")),
         aid=_text(table, "aid") if "aid" in table else "",
         number=_int(table, "number") if "number" in table else None,
+        origin=_text(table, "origin") if "origin" in table else None,
     )
 
 
@@ -398,10 +441,16 @@ def _quantity(row: Mapping[str, Any]) -> Quantity:
     return Quantity(str(row.get("unit", "")), Decimal(str(row.get("scale", 1))))
 
 
+def _named_rule(table: Mapping[str, Any]) -> tuple[str, QuantityRule]:
+    rule = _quantity_rule(table)
+    assert rule is not None  # there is a table
+    return _text(table, "id"), rule
+
+
 def _quantity_rule(row: Mapping[str, Any] | None) -> QuantityRule | None:
     if row is None:
         return None
-    choices = {int(value): _quantity(choice) for value, choice in row.get("choices", {}).items()}
+    choices = {int(value, 0): _quantity(choice) for value, choice in row.get("choices", {}).items()}
     shaft = row.get("shaft")
     return QuantityRule(parse_address(row["address"]), choices, None if shaft is None else parse_address(shaft))
 
@@ -416,6 +465,24 @@ def _limit(value: Any) -> Limit | None:
 
 def _mirror(row: Mapping[str, Any] | None) -> Mirror | None:
     return None if row is None else Mirror(parse_address(row["of"]), int(row.get("divisor", 1)))
+
+
+def _variant_detail(table: Mapping[str, Any]) -> Variant:
+    name = _text(table, "id")
+    return Variant(name, str(table.get("name", name)), Match(**table.get("match", {})))
+
+
+def _source(table: Mapping[str, Any]) -> Source:
+    return Source(_text(table, "id"), _text(table, "title"))
+
+
+def _unproven(value: Any) -> frozenset[Fact]:
+    """``inferred`` is true or false for the row, or the list of the facts that are not printed."""
+    if isinstance(value, bool):
+        return frozenset()
+    if not isinstance(value, list):
+        raise _WrongError(f"key 'inferred' is {value!r}, neither true nor false nor a list of facts")
+    return frozenset(_enum(Fact, one, "inferred") for one in value)
 
 
 def _variant(row: Mapping[str, Any]) -> VariantValues:

@@ -177,5 +177,5 @@ def _signature_guard(signature: int) -> Guard:
 
 
 def _selection(category: str | None) -> Callable[[Entry], bool]:
-    """What a save command covers: all, or the entries of its category."""
-    return lambda entry: category is None or entry.save_category == category
+    """What a save command covers: all, or the entries of its category and those without one."""
+    return lambda entry: category is None or entry.save_category in (None, category)

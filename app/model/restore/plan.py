@@ -32,6 +32,8 @@ class Why(Enum):
     """The device counts on by itself: an old value would be false, and could not be proven."""
     OTHER_UNIT = "other-unit"
     """Bound to a machine, and it is not proven that this is the same one."""
+    NETWORK = "network"
+    """Decides at which address the device is found: it is set at the device, never by a restore."""
     NEEDS_EXPERT = "needs-expert"
     READ_ONLY = "read-only"
     UNREADABLE = "unreadable"

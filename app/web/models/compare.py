@@ -34,7 +34,7 @@ ColumnKindName = Literal[
 ]
 RowStateName = Literal["same", "different", "unit", "missing", "not-comparable"]
 CellStateName = Literal["value", "not-in-set", "not-on-device", "unread", "empty"]
-RestoreClassName = Literal["copy", "unit", "factory", "never"]
+RestoreClassName = Literal["copy", "unit", "factory", "network", "never"]
 
 Spec = Annotated[str, Field(max_length=300, examples=["live:wtg-07/blade-1/pmc"])]
 Slug = Annotated[str, Field(max_length=200)]

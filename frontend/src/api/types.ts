@@ -95,7 +95,7 @@ export interface EntryDoc extends QuantityDoc {
   also: number[];
   enumeration: string | null;
   bits: string | null;
-  restore: "copy" | "unit" | "factory" | "never";
+  restore: "copy" | "unit" | "factory" | "network" | "never";
   verify: "equal" | "ack" | "effect";
   requires: { address: string; values: number[] }[];
   note: string | null;
