@@ -51,7 +51,8 @@ class Reference:
     """Position and velocity set-points: ``position`` and ``velocity`` are what the motor is to follow.
 
     A jerk-limited ramp is a trapezoid smoothed by a moving mean over acceleration / jerk: the jerk stays within its
-    limit, and the end is met exactly.
+    limit, and the end is met exactly. It is twice that where a short move goes from speeding up straight to slowing
+    down.
     """
 
     def __init__(self) -> None:

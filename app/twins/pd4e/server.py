@@ -153,6 +153,9 @@ class _Client:
         except FormatError as error:
             _LOG.info("a Modbus client is dropped: %s", error)
             self._ending = True
+        except Exception:
+            self.close()  # a defect here must not leave a client waiting; the thread tells of it
+            raise
         self._send()
 
     def _obey(self, adu: bytes) -> None:

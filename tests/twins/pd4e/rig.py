@@ -20,7 +20,7 @@ from app.wire.modbus.requests import ReadObject, ReadRegisters, Request, WriteOb
 
 MS = 1_000_000
 FOREVER = 10**18
-TIMEOUT_S = 20.0
+TIMEOUT_S = 5.0
 
 
 class AbortedError(Exception):
