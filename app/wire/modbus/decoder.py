@@ -158,9 +158,8 @@ class ModbusDecoder:
             return self._refused(node, t_ns, asked, request, answer)
         if isinstance(request, ReadObject) and isinstance(answer, ObjectRead):
             seen = self._transfer(node, t_ns, asked, request.address, Outcome.DONE, answer.data)
-            whole = request.start == 0 and len(answer.data) == request.size
             value = ValueSeen(t_ns, self.bus, node, request.address, answer.data, Source.SDO_READ)
-            return [seen, value] if whole else [seen]
+            return [seen] if request.start else [seen, value]
         if isinstance(request, WriteObject):
             return self._written(node, t_ns, asked, request.address, request.data, whole=request.start == 0)
         if isinstance(request, WriteArray):

@@ -111,6 +111,12 @@ def test_part_of_an_object_is_no_value(decoder: ModbusDecoder) -> None:
     assert values(records) == []
 
 
+def test_a_text_may_be_shorter_than_what_was_asked_for(decoder: ModbusDecoder) -> None:
+    name = Address(0x1008)
+    records = decoder.feed_all(Client().exchange(ReadObject(name, 241), ObjectRead(name, b"PD4-E591L42-E-65-4")))
+    assert [record.data for record in records if isinstance(record, ValueSeen)] == [b"PD4-E591L42-E-65-4"]
+
+
 def test_a_write_by_a_foreign_master(decoder: ModbusDecoder) -> None:
     frames = Client(OTHER, ours=False).exchange(WriteObject(CONTROLWORD, b"\x80\x00"), ObjectWritten(CONTROLWORD))
     records = decoder.feed_all(frames)
