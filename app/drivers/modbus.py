@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 from typing import Final
 
-from app.drivers import modbus_save
+from app.drivers import modbus_restart, modbus_save
 from app.drivers.contract import (
     DriverStatus,
     FoundNode,
@@ -31,14 +31,12 @@ from app.drivers.modbus_save import Stamp
 from app.drivers.modbus_verify import Finding, compare
 from app.drivers.scan import match
 from app.drivers.urgent import UrgentCommands
-from app.errors import BusLostError, BusOpenError, DeviceError, HubsideError, NoAnswerError, ProtocolError, UsageError
+from app.errors import BusOpenError, DeviceError, HubsideError, NoAnswerError, ProtocolError, UsageError
 from app.model.address import Address
 from app.model.description import Bus, Description, Verify
 from app.wire.frame import Frame, Stamper
-from app.wire.modbus.device import BOOT, REBOOT, UPTIME
 
 _LOG: Final = logging.getLogger(__name__)
-RESTART: Final = Address(REBOOT, 1)
 BULK: Final = 64
 """A list of so many objects is read by FC 101 first, and what that does not give one by one."""
 DEVICE_TYPE: Final = Address(0x1000)
@@ -48,10 +46,7 @@ SOFTWARE: Final = Address(0x100A)
 IDENTITY: Final = tuple(Address(0x1018, sub) for sub in (1, 2, 3, 4))
 _ASKED: Final = (DEVICE_TYPE, DEVICE_NAME, HARDWARE, SOFTWARE, *IDENTITY)
 _SCAN_TIMEOUT_S: Final = 0.5
-_GOING_S: Final = 1.0
-"""So long a device that was told to restart may keep its connection."""
 _PROGRESS_S: Final = 0.05
-_POLL_S: Final = 0.05
 
 
 def _now() -> datetime:
@@ -123,7 +118,7 @@ class ModbusDriver:
         for subscriber in self._subscribers:
             try:
                 subscriber([frame])
-            except Exception:
+            except Exception:  # noqa: BLE001 - whatever a subscriber does, the others and the wire go on
                 _LOG.exception("a subscriber of %s failed", self.bus)
 
     def set_description(self, node: int, description: Description) -> None:
@@ -233,51 +228,8 @@ class ModbusDriver:
         return self._process[node]
 
     async def restart(self, node: int, timeout_s: float = 10.0) -> None:
-        """Restart the firmware by 2800h and wait until it answers with a lower uptime (230Fh).
-
-        Raises NoAnswerError, BusLostError; SdoAbortError where the device refuses.
-        """
-        device = self._device(node)
-        what = f"restart of {device.peer.server}"
-        try:
-            async with asyncio.timeout(timeout_s):
-                before = await self._uptime_s(device, timeout_s)
-                start_s = time.monotonic()
-                try:
-                    await device.write(RESTART, BOOT, timeout_s, verify=Verify.ACK)
-                except BusLostError:
-                    _LOG.info("the device has gone before it acknowledged its restart")
-                await self._gone(device)
-                await self._back(device, before, start_s, timeout_s)
-        except TimeoutError:
-            raise NoAnswerError(node=node, address=what, timeout_s=timeout_s) from None
-
-    async def _gone(self, device: ModbusDevice) -> None:
-        """The connection does not outlive the restart; one that nobody closes is ended here."""
-        try:
-            await device.wait_for(LinkState.LOST, _GOING_S)
-        except TimeoutError:
-            if device.state is LinkState.CONNECTED:
-                await device.renew()
-
-    async def _back(self, device: ModbusDevice, before_s: int | None, start_s: float, timeout_s: float) -> None:
-        while True:
-            await device.wait_for(LinkState.CONNECTED, timeout_s)
-            try:
-                await device.read(DEVICE_TYPE, _SCAN_TIMEOUT_S)
-                uptime_s = await self._uptime_s(device, _SCAN_TIMEOUT_S)
-            except (NoAnswerError, ProtocolError):
-                await asyncio.sleep(_POLL_S)
-                continue
-            if uptime_s is None or before_s is None or uptime_s <= time.monotonic() - start_s + 1:
-                return
-            await asyncio.sleep(_POLL_S)
-
-    async def _uptime_s(self, device: ModbusDevice, timeout_s: float) -> int | None:
-        try:
-            return int.from_bytes(await device.read(UPTIME, timeout_s), "little")
-        except DeviceError:
-            return None
+        """Restart the firmware by 2800h and wait until it is back; see ``modbus_restart``."""
+        await modbus_restart.restart(self._device(node), timeout_s)
 
     async def scan(
         self, nodes: Sequence[int] | None = None, on_progress: ProgressCallback | None = None

@@ -99,7 +99,7 @@ class ModbusDevice:
             raise self._not_connected()
         return self._link
 
-    async def wait_for(self, state: LinkState, timeout_s: float) -> None:
+    async def wait_for(self, state: LinkState, timeout_s: float | None = None) -> None:
         """Wait until the connection is in ``state``. Raises TimeoutError."""
         async with asyncio.timeout(timeout_s):
             while self.state is not state:
@@ -165,13 +165,17 @@ class ModbusDevice:
         if address.major in _SLOW:
             wait_s = max(wait_s, SAVE_TIMEOUT_S)
         async with link.turn(urgent):
-            if known is not None and self._commands.count(self.peer.node, address) != known:
-                raise OvertakenError(bus=self._bus, node=self.peer.node, address=address.short)
+            self.require_known(address, known)
             attempt = link.send(WriteObject(address, data))
             answer = await self._end_of_write(link, attempt, address, wait_s, urgent)
         if answer is None:
             return await self._look_at(attempt, address, data, verify, urgent)
         return await self._written(answer, address, urgent)
+
+    def require_known(self, address: Address, known: int | None) -> None:
+        """Raises OvertakenError where an urgent command came to the object that a write did not know of."""
+        if known is not None and self._commands.count(self.peer.node, address) != known:
+            raise OvertakenError(bus=self._bus, node=self.peer.node, address=address.short)
 
     async def _end_of_write(
         self, link: ModbusLink, attempt: Attempt, address: Address, wait_s: float, urgent: bool

@@ -12,10 +12,10 @@ from collections.abc import Iterable, Mapping
 from typing import Final, NamedTuple
 
 from app.drivers.modbus_device import DEFAULT_TIMEOUT_S, ModbusDevice
-from app.drivers.modbus_link import ModbusLink
-from app.errors import RefusedError
+from app.drivers.modbus_link import InterruptedRequest, ModbusLink
+from app.errors import RefusedError, UnverifiedError
 from app.model.address import Address
-from app.wire.modbus.answers import RegistersRead
+from app.wire.modbus.answers import Answer, RegistersRead
 from app.wire.modbus.functions import MAX_READ
 from app.wire.modbus.image import (
     RX_MAPPING,
@@ -64,33 +64,50 @@ class ProcessData:
         return self._images
 
     async def exchange(
-        self, values: Mapping[Address, bytes] | None = None, timeout_s: float = DEFAULT_TIMEOUT_S
+        self,
+        values: Mapping[Address, bytes] | None = None,
+        timeout_s: float = DEFAULT_TIMEOUT_S,
+        known: Mapping[Address, int] | None = None,
     ) -> dict[Address, bytes]:
         """Write ``values`` and read all that the device sends, both in one FC 23 (FC 3 where nothing is written).
 
-        What is written must fill the registers that it touches: nobody knows what its neighbours should be. Values
-        whose order of words is not known yet are read by FC 43. A write that had no answer in time is not repeated.
+        What is written must fill the registers that it touches: nobody knows what its neighbours should be. ``known``:
+        what ``commanded`` said of written objects; after another urgent command nothing is sent. Values whose order of
+        words is not known yet are read by FC 43.
 
-        Raises RefusedError (nothing was sent), ModbusExceptionError, NoAnswerError, InterruptedRequest, BusLostError.
+        Raises RefusedError (nothing was sent; OvertakenError too), ModbusExceptionError, NoAnswerError, BusLostError,
+        UnverifiedError (it had to make room for an urgent command; whether it was carried out is not known).
         """
         images = await self.images()
-        image = images.sent
-        start, quantity = image.span
-        if values:
-            write = _window(images.received, values)
-            registers = _registers(images.received, write, values)
-            request: ReadRegisters | ReadWriteRegisters = ReadWriteRegisters(start, quantity, write.start, registers)
-            answer = await images.link.request(request, timeout_s, what=_what(values))
-        else:
-            request = ReadRegisters(start, quantity)
-            answer = await self._device.ask(request, timeout_s, what=f"registers from {start}")
+        start, quantity = images.sent.span
+        answer = await (
+            self._written(images, values, timeout_s, known or {})
+            if values
+            else self._device.ask(ReadRegisters(start, quantity), timeout_s, what=f"registers from {start}")
+        )
         if not isinstance(answer, RegistersRead):
             raise self._device.refusal(answer, _what(values or {}))
-        found = dict(image.values(start, answer.registers))
-        for address in image.places:
+        found = dict(images.sent.values(start, answer.registers))
+        for address in images.sent.places:
             if address not in found:
                 found[address] = await self._device.read(address, timeout_s)
         return found
+
+    async def _written(
+        self, images: Images, values: Mapping[Address, bytes], timeout_s: float, known: Mapping[Address, int]
+    ) -> Answer:
+        window = _window(images.received, values)
+        registers = _registers(images.received, window, values)
+        request = ReadWriteRegisters(*images.sent.span, window.start, registers)
+        async with images.link.turn():
+            for address in values:
+                self._device.require_known(address, known.get(address))
+            try:
+                return await images.link.finish(images.link.send(request), timeout_s, what=_what(values))
+            except InterruptedRequest:
+                sent = " ".join(f"{register:04X}" for register in registers)
+                reason = "interrupted by an urgent command"
+                raise UnverifiedError(address=_what(values), name="", sent=sent, found=None, reason=reason) from None
 
     # -- the mapping ---------------------------------------------------------------------
 

@@ -114,7 +114,7 @@ async def _ended(device: ModbusDevice, command: SaveCommand) -> None:
     value = None
     try:
         async with asyncio.timeout(command.timeout_s):
-            while (value := int.from_bytes(await device.read(command.address), "little")) != READY:
+            while (value := await _number(device, command.address)) != READY:  # noqa: ASYNC110  only the device knows
                 await asyncio.sleep(_POLL_S)
     except TimeoutError:
         raise UnverifiedError(
@@ -124,3 +124,7 @@ async def _ended(device: ModbusDevice, command: SaveCommand) -> None:
             found=None if value is None else f"{value:08X}h",
             reason=f"the save has not ended within {command.timeout_s:g} s",
         ) from None
+
+
+async def _number(device: ModbusDevice, address: Address) -> int:
+    return int.from_bytes(await device.read(address), "little")

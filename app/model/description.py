@@ -295,7 +295,7 @@ class Entry:
 
     def proves(self, fact: Fact) -> bool:
         """True where the device's own manual prints the fact."""
-        return not self.inferred or (bool(self.unproven) and fact not in self.unproven)
+        return not self.inferred or bool(self.unproven) and fact not in self.unproven
 
     @property
     def title(self) -> str:
