@@ -94,7 +94,7 @@ class RestorePlanRow(BaseModel):
     address: str
     name: str
     group: str
-    restore_class: Literal["copy", "unit", "factory", "never"] | None
+    restore_class: Literal["copy", "unit", "factory", "network", "never"] | None
     unit: str
     treatment: Literal["write", "equal", "skip"]
     why: str | None
