@@ -44,6 +44,7 @@ _SLOW: Final = frozenset({0x1010, 0x1011})
 _REOPEN_S: Final = (0.1, 0.2, 0.5, 1.0, 2.0)
 _SIZES: Final = (4, 2, 1, 8, MAX_OBJECT_DATA)
 """Bytes that are asked for where the size is not known, or another one than described; texts may have fewer."""
+_STATE_NAMES: Final = {AxisState.READY: "ready_to_switch_on", AxisState.NOT_READY: "not_ready_to_switch_on"}
 _WRONG_SIZE: Final = frozenset({Abort.LENGTH, Abort.LENGTH_TOO_HIGH, Abort.LENGTH_TOO_LOW})
 
 
@@ -222,7 +223,7 @@ class ModbusDevice:
             state = AxisState.of(int.from_bytes(await self.read(STATUSWORD), "little"))
         except HubsideError:
             return None
-        return None if state is None else f"axis_state.{state.name.lower()}"
+        return None if state is None else f"axis_state.{_STATE_NAMES.get(state, state.name.lower())}"
 
     # -- what is known of objects ------------------------------------------------------------
 
