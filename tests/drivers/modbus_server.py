@@ -173,7 +173,8 @@ class Dictionary:
             case WriteArray():
                 raise _AbortedError(Abort.UNSUPPORTED_ACCESS)
             case ReadRegisters(start, quantity, function):
-                return self._registers(start, quantity) or ExceptionAnswer(function, ModbusException.ILLEGAL_ADDRESS)
+                found = self._registers(start, quantity)
+                return _no_register(request) if found is None else found._replace(function=function)
             case WriteRegister(start, value):
                 return request if self._put(start, (value,)) else _no_register(request)
             case WriteRegisters(start, registers):

@@ -261,7 +261,7 @@ async def test_a_write_whose_connection_ends_is_unknown_and_not_repeated() -> No
         with pytest.raises(BusLostError) as caught:
             await driver.write(1, WINDOW, FOUR, timeout_s=PATIENCE_S)
         assert "outcome unknown" in caught.value.details["reason"]
-        await driver._device(1).wait_for(LinkState.CONNECTED, PATIENCE_S)
+        await becomes(driver, LinkState.CONNECTED)
         assert await driver.read(1, WINDOW) == ending.dictionary.objects[WINDOW]
         assert ending.count(WriteObject) == 1
         assert driver.status.reconnects == 1
@@ -272,14 +272,18 @@ async def test_a_lost_device_refuses_at_once_and_comes_back() -> None:
     async with small(bad) as (driver, server):
         port = server.port
         await server.stop()
-        await driver._device(1).wait_for(LinkState.LOST, PATIENCE_S)
+        assert await becomes(driver, LinkState.LOST) is LinkState.LOST
         with pytest.raises(BusLostError):
             await driver.read(1, WINDOW)
-        assert driver.status.state is LinkState.LOST
         await server.start(port)
-        await driver._device(1).wait_for(LinkState.CONNECTED, PATIENCE_S)
-        assert driver.status.state is LinkState.CONNECTED
+        assert await becomes(driver, LinkState.CONNECTED) is LinkState.CONNECTED
         assert await driver.read(1, WINDOW) == bad.dictionary.objects[WINDOW]
+
+
+async def becomes(driver: ModbusDriver, state: LinkState) -> LinkState:
+    """Wait for the state of device 1; returns the driver's."""
+    await driver._device(1).wait_for(state, PATIENCE_S)
+    return driver.status.state
 
 
 async def test_who_cannot_be_reached_at_all() -> None:
@@ -659,8 +663,8 @@ async def test_a_changed_mapping_is_read_anew() -> None:
         assert set(await process.exchange()) == {POSITION}
         bad.dictionary.objects[Address(0x3602, 1)] = (0x60410010).to_bytes(4, "little")  # by somebody else, then
         server.drop()
-        await driver._device(1).wait_for(LinkState.LOST, PATIENCE_S)
-        await driver._device(1).wait_for(LinkState.CONNECTED, PATIENCE_S)
+        await becomes(driver, LinkState.LOST)
+        await becomes(driver, LinkState.CONNECTED)
         assert set(await process.exchange()) == {STATUSWORD}
 
 
