@@ -132,22 +132,21 @@ class Servo:
         torque = self.current_ma / self.motor.rated_ma * self.motor.torque_nm + self.load_nm
         pushed = self.velocity + torque / (self.motor.inertia_kgm2 * _TURN_RAD) * CYCLE_S
         friction = self.motor.friction_nm / (self.motor.inertia_kgm2 * _TURN_RAD) * CYCLE_S
-        now = slowed(pushed, friction)
-        self._learn_load(now)
-        before = self.position
-        self.position += (self.velocity + now) / 2 * CYCLE_S
-        self.velocity = now
+        was, before = self.velocity, self.position
+        self.velocity = slowed(pushed, friction)
+        self.position += (was + self.velocity) / 2 * CYCLE_S
         self._stop_at_ends()
+        self._learn_load(was)
         index = self.bench.index
         self.crossed_index = floor(before - index) != floor(self.position - index)
 
-    def _learn_load(self, now: float) -> None:
+    def _learn_load(self, was: float) -> None:
         """What the motor must give besides speeding up: its current, less what the change of speed and friction took.
 
         A shaft that is held gives no hint; then the current stays, and grows as long as something is wanted.
         """
-        moved = self._per_rev_s2 * (now - self.velocity) / CYCLE_S
-        rubbed = copysign(self._friction_ma, now) if now else 0.0
+        moved = self._per_rev_s2 * (self.velocity - was) / CYCLE_S
+        rubbed = copysign(self._friction_ma, self.velocity) if self.velocity else 0.0
         needed = self.current_ma - moved - rubbed
         self._against_load_ma += (needed - self._against_load_ma) * CYCLE_S / _LEARNING_S
 
