@@ -23,6 +23,7 @@ from app.errors import (
     NoAnswerError,
     OvertakenError,
     ProtocolError,
+    RefusedError,
     SdoAbortError,
     UnverifiedError,
 )
@@ -71,7 +72,9 @@ class ModbusDevice:
     # -- the connection ------------------------------------------------------------------
 
     async def open(self, timeout_s: float) -> None:
-        """Connect. Raises BusOpenError."""
+        """Connect; nothing where it is connected. Raises BusOpenError."""
+        if self.state is LinkState.CONNECTED:
+            return
         link = ModbusLink(self.peer, self._bus, self._stamper, self._tap, self._on_lost)
         await link.open(timeout_s)
         self._link = link
@@ -162,13 +165,16 @@ class ModbusDevice:
         verify: Verify = Verify.EQUAL, urgent: bool = False, known: int | None = None,
     ) -> Written:  # fmt: skip
         """Write once. See ``contract.Driver.write``."""
+        if len(data) > MAX_OBJECT_DATA:
+            reason = f"{len(data)} bytes do not fit one message ({MAX_OBJECT_DATA} do)"
+            raise RefusedError(device=self.peer.server, address=address.short, reason=reason)
         link, wait_s = self.link, self._timeout_s(address, timeout_s)
         if address.major in _SLOW:
             wait_s = max(wait_s, SAVE_TIMEOUT_S)
         async with link.turn(urgent):
             self.require_known(address, known)
-            attempt = link.send(WriteObject(address, data))
-            answer = await self._end_of_write(link, attempt, address, wait_s, urgent)
+            attempt = link.send(WriteObject(address, data), urgent)
+            answer = await self._end_of_write(link, attempt, address, wait_s)
         if answer is None:
             return await self._look_at(attempt, address, data, verify, urgent)
         return await self._written(answer, address, urgent)
@@ -178,12 +184,10 @@ class ModbusDevice:
         if known is not None and self._commands.count(self.peer.node, address) != known:
             raise OvertakenError(bus=self._bus, node=self.peer.node, address=address.short)
 
-    async def _end_of_write(
-        self, link: ModbusLink, attempt: Attempt, address: Address, wait_s: float, urgent: bool
-    ) -> Answer | None:
+    async def _end_of_write(self, link: ModbusLink, attempt: Attempt, address: Address, wait_s: float) -> Answer | None:
         """The answer, None where there was none in time."""
         try:
-            return await link.finish(attempt, wait_s, urgent, str(address))
+            return await link.finish(attempt, wait_s, str(address))
         except BusLostError as error:
             reason = f"lost while writing, outcome unknown ({error.details['reason']})"
             raise BusLostError(bus=self._bus, node=self.peer.node, address=str(address), reason=reason) from error

@@ -4,9 +4,9 @@ An answer counts only with the transaction, unit and function of the open reques
 for. What no rule allows, or a disconnect, fails the open request at once and ends the connection.
 
 A request that is given up (cancelled, timed out, interrupted) does not end the connection: what a drive does when it
-breaks is not known. Its transaction is remembered instead, so that its late answer is recognised and never taken for
-that of another; numbers come round after 65,536 transactions only. The server answers in order, so a write that
-follows is executed after it.
+breaks is not known. Its transaction is remembered instead, and not used again before its late answer has come, which is
+recognised by it and never taken for that of another request. The server answers in order, so a write that follows is
+executed after it.
 """
 
 from __future__ import annotations
@@ -44,10 +44,11 @@ class InterruptedRequest(Exception):  # noqa: N818 - it is no error: whoever ask
 class Attempt:
     """One request on the wire, and what became of it; ``late`` is an answer that came after it was given up."""
 
-    __slots__ = ("future", "late", "request")
+    __slots__ = ("future", "late", "request", "urgent")
 
-    def __init__(self, request: Request, future: asyncio.Future[Answer]) -> None:
+    def __init__(self, request: Request, urgent: bool, future: asyncio.Future[Answer]) -> None:
         self.request = request
+        self.urgent = urgent
         self.future = future
         self.late: Answer | None = None
 
@@ -69,7 +70,7 @@ class ModbusLink:
         self._stamper = stamper
         self._tap = tap
         self._on_lost = on_lost
-        self._turns = Turns()
+        self._turns = Turns(self._make_room)
         self._transaction = 0
         self._open: tuple[int, Attempt] | None = None
         self._given_up: dict[int, Attempt] = {}
@@ -118,44 +119,29 @@ class ModbusLink:
     @property
     def wanted_urgently(self) -> bool:
         """Somebody urgent waits for the turn."""
-        return self._turns.wanted_urgently.is_set()
+        return self._turns.wanted_urgently
 
-    async def finish(self, attempt: Attempt, timeout_s: float, urgent: bool = False, what: str = "") -> Answer:
+    async def finish(self, attempt: Attempt, timeout_s: float, what: str = "") -> Answer:
         """Wait for the answer to what was sent in this turn. ``what`` names it in errors.
 
         Raises NoAnswerError after ``timeout_s``, InterruptedRequest for an urgent one, BusLostError, ProtocolError.
         """
         try:
             async with asyncio.timeout(timeout_s):
-                if not urgent:
-                    await self._until_wanted(attempt)
-                return await asyncio.shield(attempt.future)
+                return await attempt.future
         except TimeoutError:
             raise NoAnswerError(node=self.peer.node, address=what, timeout_s=timeout_s) from None
         finally:
-            if not attempt.future.done():
-                self._give_up(attempt)
+            self._give_up(attempt)
 
     async def request(self, request: Request, timeout_s: float, urgent: bool = False, what: str = "") -> Answer:
         """One transaction: wait for the turn, send, wait for the answer. Raises what ``finish`` raises."""
         async with self.turn(urgent):
-            return await self.finish(self.send(request), timeout_s, urgent, what)
+            return await self.finish(self.send(request, urgent), timeout_s, what)
 
     # -- sending -----------------------------------------------------------------------
 
-    async def _until_wanted(self, attempt: Attempt) -> None:
-        """Wait for the answer, but for a short grace only once somebody urgent waits. Raises InterruptedRequest."""
-        wanted = asyncio.ensure_future(self._turns.wanted_urgently.wait())
-        try:
-            await asyncio.wait((attempt.future, wanted), return_when=asyncio.FIRST_COMPLETED)
-            if not attempt.future.done():
-                await asyncio.wait((attempt.future,), timeout=URGENT_GRACE_S)
-                if not attempt.future.done():
-                    raise InterruptedRequest
-        finally:
-            wanted.cancel()
-
-    def send(self, request: Request) -> Attempt:
+    def send(self, request: Request, urgent: bool = False) -> Attempt:
         """Put one request on the wire; only within ``turn``, and after the one before it has ended.
 
         Raises BusLostError, ProtocolError (what has ended the connection).
@@ -166,16 +152,36 @@ class ModbusLink:
             self._end(BusLostError(bus=self._bus, reason=f"{self.peer.server} takes no more bytes"))
         if self._ended is not None:
             raise self._ended
-        self._transaction = self._transaction % 0xFFFF + 1
-        attempt = Attempt(request, asyncio.get_running_loop().create_future())
+        self._transaction = self._next_transaction()
+        attempt = Attempt(request, urgent, asyncio.get_running_loop().create_future())
         attempt.future.add_done_callback(_retrieve)
         data = Message(self._transaction, self.peer.unit, request.pdu()).encode()
         self._open = (self._transaction, attempt)
         self._tap(Frame(self._stamper(), self._bus, Direction.TX, Adu(data, self._names[0])))
         self._streams[1].write(data)
+        if self.wanted_urgently:
+            self._make_room()
         return attempt
 
+    def _next_transaction(self) -> int:
+        """Never 0, which some servers answer with to anything, and none whose answer may still come."""
+        number = self._transaction % 0xFFFF + 1
+        while number in self._given_up:
+            number = number % 0xFFFF + 1
+        return number
+
+    def _make_room(self) -> None:
+        """Somebody urgent waits: what is under way has a short grace."""
+        if self._open is not None and not self._open[1].urgent:
+            asyncio.get_running_loop().call_later(URGENT_GRACE_S, self._interrupt, self._open[1])
+
+    def _interrupt(self, attempt: Attempt) -> None:
+        if self.wanted_urgently and not attempt.future.done():
+            attempt.future.set_exception(InterruptedRequest())
+            self._give_up(attempt)
+
     def _give_up(self, attempt: Attempt) -> None:
+        """Nobody waits for the answer any more. Nothing where it has come."""
         if self._open is None or self._open[1] is not attempt:
             return
         self._given_up[self._open[0]] = attempt
@@ -211,13 +217,14 @@ class ModbusLink:
         if message.unit != self.peer.unit or not answers(attempt.request, answer):
             asked = f"unit {self.peer.unit}, {type(attempt.request).__name__}"
             self._violated(f"unit {message.unit}, function {message.function} is no answer to: {asked}")
-        elif is_open:
-            self._open = None
-            attempt.future.set_result(answer)
-        else:
-            del self._given_up[message.transaction]
+            return
+        self._open = None if is_open else self._open
+        self._given_up.pop(message.transaction, None)
+        if attempt.future.done():
             self.late += 1
             attempt.late = answer
+        else:
+            attempt.future.set_result(answer)
 
     def _violated(self, reason: str) -> None:
         self._end(ProtocolError(bus=self._bus, node=self.peer.node, reason=f"{self.peer.server}: {reason}"))

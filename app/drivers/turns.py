@@ -4,18 +4,23 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 
 
 class Turns:
-    """A lock with two queues. ``wanted_urgently`` is set while somebody urgent waits: who holds it can make room."""
+    """A lock with two queues. ``on_urgent`` is called whenever somebody urgent begins to wait for who holds it."""
 
-    def __init__(self) -> None:
-        self.wanted_urgently = asyncio.Event()
+    def __init__(self, on_urgent: Callable[[], None]) -> None:
+        self._on_urgent = on_urgent
         self._taken = False
         self._urgent: deque[asyncio.Future[None]] = deque()
         self._waiting: deque[asyncio.Future[None]] = deque()
+
+    @property
+    def wanted_urgently(self) -> bool:
+        """Somebody urgent waits: who holds the lock can make room."""
+        return bool(self._urgent)
 
     @asynccontextmanager
     async def taken(self, urgent: bool = False) -> AsyncIterator[None]:
@@ -34,7 +39,7 @@ class Turns:
         turn: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         queue.append(turn)
         if urgent:
-            self.wanted_urgently.set()
+            self._on_urgent()
         try:
             await turn
         except asyncio.CancelledError:
@@ -42,17 +47,11 @@ class Turns:
                 self._give_on()  # it was given to us in the same moment
             else:
                 queue.remove(turn)
-                self._tell()
             raise
 
     def _give_on(self) -> None:
         for queue in (self._urgent, self._waiting):
             if queue:
                 queue.popleft().set_result(None)
-                self._tell()
                 return
         self._taken = False
-
-    def _tell(self) -> None:
-        if not self._urgent:
-            self.wanted_urgently.clear()

@@ -296,6 +296,22 @@ async def test_who_cannot_be_reached_at_all() -> None:
     await driver.close()
 
 
+async def test_what_fits_no_message_is_refused_and_not_sent() -> None:
+    bad = Bad()
+    async with small(bad) as (driver, _):
+        with pytest.raises(RefusedError):
+            await driver.write(1, Address(0x1008), bytes(242))
+        assert bad.seen == []
+
+
+async def test_connecting_again_keeps_the_connection() -> None:
+    bad = Bad()
+    async with small(bad) as (driver, server):
+        await driver.connect()
+        assert await driver.read(1, WINDOW) == bad.dictionary.objects[WINDOW]
+        assert server.connections == 1
+
+
 # -- STOP ------------------------------------------------------------------------------
 
 

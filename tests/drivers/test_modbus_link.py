@@ -106,6 +106,18 @@ async def test_transactions_are_never_zero_and_never_twice_in_a_row() -> None:
         assert numbers == [0xFFFF, 1, 2, 3]
 
 
+async def test_a_transaction_whose_answer_may_still_come_is_not_used_again() -> None:
+    async with linked() as side:
+        with pytest.raises(NoAnswerError):
+            await side.link.request(READ, 0.02)
+        assert (await side.held.next()).transaction == 1
+        side.link._transaction = 0xFFFF
+        task, message = await side.asked(READ)
+        assert message.transaction == 2
+        side.held.say(reply(message, VALUE))
+        await task
+
+
 async def test_answers_split_and_joined_anywhere() -> None:
     async with linked() as side:
         for cut in range(1, 20):
