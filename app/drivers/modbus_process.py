@@ -2,8 +2,8 @@
 
 The default mapping differs between devices: an assumed register may be that of another object. So 3502h and 3602h are
 read before the first exchange on a connection, and again after anybody has written them through it. Which register of a
-32-bit value comes first the device shows by one such value, read both ways; until it has, those are read by FC 43, and
-none is written.
+32-bit value comes first the device shows by one such value, of either image, read both ways. Until it has, those are
+read by FC 43, and none is written.
 """
 
 from __future__ import annotations
@@ -59,7 +59,9 @@ class ProcessData:
         link = self._device.link
         if self._images is None or self._images.link is not link:
             received, sent = await self._mapping(RX_MAPPING, RX_REGISTER), await self._mapping(TX_MAPPING, TX_REGISTER)
-            received.order = sent.order = await self._order(self._image(sent))
+            received.order = sent.order = await self._order(self._image(sent)) or await self._order(
+                self._image(received)
+            )
             self._images = Images(self._image(received), self._image(sent), link)
         return self._images
 
@@ -128,17 +130,16 @@ class ProcessData:
         return image
 
     async def _order(self, image: ProcessImage) -> WordOrder | None:
-        """The order of words, None where no value of this moment tells."""
+        """The order of words, None where no value of this moment tells, or where these registers cannot be read."""
         long = [address for address, start, stop in image.slots if stop - start >= 4 and start % 2 == 0]
-        for _ in range(ORDER_TRIES if long else 0):
-            request = ReadRegisters(*image.span)
-            answer = await self._device.ask(request, DEFAULT_TIMEOUT_S, what=f"registers from {image.start}")
-            if not isinstance(answer, RegistersRead):
-                raise self._device.refusal(answer, f"registers from {image.start}")
+        for _ in range(ORDER_TRIES):
             for address in long:
-                first = image.places[address].start - image.start
-                registers = answer.registers[first : first + image.places[address].quantity]
-                order = shown_order(await self._device.read(address), registers)
+                place = image.places[address]
+                request = ReadRegisters(place.start, place.quantity)
+                answer = await self._device.ask(request, DEFAULT_TIMEOUT_S, what=f"registers from {place.start}")
+                if not isinstance(answer, RegistersRead):
+                    return None
+                order = shown_order(await self._device.read(address), answer.registers)
                 if order is not None:
                     return order
         return None

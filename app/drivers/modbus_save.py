@@ -13,7 +13,6 @@ from collections.abc import Callable
 from datetime import UTC, date, datetime, timedelta
 from typing import Final, NamedTuple
 
-from app.drivers.contract import Written
 from app.drivers.modbus_device import STATUSWORD, ModbusDevice
 from app.errors import DeviceError, PreconditionError, UnverifiedError, UsageError
 from app.model.address import Address
@@ -70,8 +69,7 @@ async def save(device: ModbusDevice, category: str | None, now: Callable[[], dat
     await device.write(SAVED_TIME, stamp.ms.to_bytes(4, "little"))
     await _standstill(device)  # it may have been started meanwhile
     signature = command.signature.to_bytes(4, "little")
-    done = await device.write(command.address, signature, command.timeout_s, verify=Verify.ACK)
-    assert done is Written.ACKNOWLEDGED  # what is verified by its acknowledge has no other end
+    await device.write(command.address, signature, command.timeout_s, verify=Verify.ACK)
     await _ended(device, command)
     return stamp
 

@@ -453,7 +453,7 @@ async def test_a_backup_that_has_no_data_from_the_begin_fails() -> None:
 async def test_a_backup_begins_anew_after_a_time_out() -> None:
     ending = Ending(None)
     async with small(ending) as (driver, _):
-        assert await read_dictionary(driver._device(1), timeout_s=0.1) == ending.dictionary.objects
+        assert await read_dictionary(driver._device(1), timeout_s=1.0) == ending.dictionary.objects
         starts = [number for number, request in enumerate(ending.seen) if request == ReadDictionary(Phase.START)]
         assert starts == [0, 3]
 
@@ -642,7 +642,7 @@ async def test_until_the_order_is_known_long_values_are_read_as_objects_and_neve
     bad = mapped(position=0)
     async with small(bad) as (driver, _):
         process = driver.process_data(1)
-        await process.exchange()
+        assert (await process.images()).sent.order is None
         bad.dictionary.objects[POSITION] = (0x00010203).to_bytes(4, "little")
         assert (await process.exchange())[POSITION] == (0x00010203).to_bytes(4, "little")
         with pytest.raises(RefusedError):
@@ -650,6 +650,26 @@ async def test_until_the_order_is_known_long_values_are_read_as_objects_and_neve
         assert bad.count(ReadWriteRegisters) == 0
         await process.exchange({CONTROLWORD: b"\x06\0"})
         assert bad.dictionary.objects[CONTROLWORD] == b"\x06\0"
+
+
+@pytest.mark.parametrize("order", WordOrder)
+async def test_an_axis_at_zero_shows_the_order_by_what_it_takes(order: WordOrder) -> None:
+    bad = mapped(order, position=0)
+    bad.dictionary.objects[TARGET] = (0x00010203).to_bytes(4, "little")
+    async with small(bad) as (driver, _):
+        assert (await driver.process_data(1).images()).sent.order is order
+
+
+async def test_a_device_that_does_not_give_what_it_takes_shows_no_order_by_it() -> None:
+    class Refusing(Bad):
+        async def instead(self, message: Message, request: object) -> bytes | None:
+            if isinstance(request, ReadRegisters) and request.start >= 6000:
+                return reply(message, ExceptionAnswer(3, 2))
+            return None
+
+    async with small(Refusing(mapped(position=0).dictionary)) as (driver, _):
+        assert (await driver.process_data(1).images()).sent.order is None
+        assert await driver.process_data(1).exchange()
 
 
 @pytest.mark.parametrize(
@@ -735,6 +755,7 @@ async def test_the_whole_of_a_twin() -> None:
                 assert await driver.read(1, address) == dictionary[address]
             deviations = {each.deviation for each in await driver.verify(1)}
             assert Deviation.SIZE not in deviations
+            assert (await driver.process_data(1).images()).sent.order is WordOrder.HIGH_FIRST  # by 6081h
             data = await driver.process_data(1).exchange()
             assert data[STATUSWORD] == await driver.read(1, STATUSWORD)
             await driver.write(1, Address(0x2030), (7).to_bytes(4, "little"))

@@ -27,7 +27,7 @@ from app.wire.modbus.answers import (
 from app.wire.modbus.decoder import ModbusDecoder
 from app.wire.modbus.frames import ObjectFrame
 from app.wire.modbus.functions import Function, Phase
-from app.wire.modbus.image import RX_MAPPING, TX_MAPPING
+from app.wire.modbus.image import RX_MAPPING, TX_MAPPING, WordOrder
 from app.wire.modbus.requests import (
     ReadDictionary,
     ReadObject,
@@ -238,6 +238,16 @@ def test_the_order_of_words_is_learned_from_the_device(mapped: ModbusDecoder) ->
     assert (POSITION, 0x00010203, Source.PDO_TX) in values(mapped.feed_all(client.exchange(read, registers)))
     write = WriteRegisters(6002, (5, 0))
     assert values(mapped.feed_all(client.exchange(write, RegistersWritten(6002, 2)))) == [(TARGET, 5, Source.PDO_RX)]
+
+
+def test_the_order_of_words_is_learned_from_what_the_device_takes_too(mapped: ModbusDecoder) -> None:
+    client = Client().at(10_000 * MS)
+    read, registers = ReadRegisters(6002, 2), RegistersRead((0x0203, 0x0001))
+    target = ObjectRead(TARGET, (0x00010203).to_bytes(4, "little"))
+    mapped.feed_all([*client.exchange(read, registers), *client.exchange(ReadObject(TARGET, 4), target)])
+    image = mapped.image(NODE, sent_by_device=True)
+    assert image is not None
+    assert image.order is WordOrder.LOW_FIRST
 
 
 def test_an_old_reading_shows_no_order(mapped: ModbusDecoder) -> None:
