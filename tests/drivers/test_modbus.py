@@ -357,11 +357,14 @@ async def test_a_stop_passes_a_write_that_has_no_answer_and_that_is_looked_at() 
 
     slow = Slow()
     async with small(slow) as (driver, server):
+        sent: list[Frame] = []
+        driver.subscribe(sent.extend)
         writing = asyncio.create_task(driver.write(1, WINDOW, FOUR, timeout_s=PATIENCE_S))
         while not server.requests:  # noqa: ASYNC110  the server has no event for it
             await asyncio.sleep(0.001)
         stopping = asyncio.create_task(driver.write(1, CONTROLWORD, STOP, urgent=True))
-        await asyncio.sleep(0.1)
+        while len(sent) < 2:  # noqa: ASYNC110  what is sent calls no event
+            await asyncio.sleep(0.001)
         release.set()
         assert await stopping is Written.ACKNOWLEDGED
         assert await writing is Written.ACKNOWLEDGED

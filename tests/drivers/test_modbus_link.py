@@ -8,7 +8,10 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
+from app.drivers import modbus_link
 from app.drivers.modbus_link import MAX_UNANSWERED, InterruptedRequest, ModbusLink
 from app.errors import BusLostError, BusOpenError, NoAnswerError, ProtocolError
 from app.model.address import Address
@@ -62,10 +65,18 @@ class Side:
     def ask(self, request: Request, timeout_s: float = PATIENCE_S, urgent: bool = False) -> asyncio.Task[Answer]:
         return asyncio.create_task(self.link.request(request, timeout_s, urgent))
 
-    async def asked(self, request: Request, urgent: bool = False) -> tuple[asyncio.Task[Answer], Message]:
+    async def asked(
+        self, request: Request, urgent: bool = False, timeout_s: float = PATIENCE_S
+    ) -> tuple[asyncio.Task[Answer], Message]:
         """A request that has reached the server."""
-        task = self.ask(request, urgent=urgent)
+        task = self.ask(request, timeout_s, urgent)
         return task, await self.held.next()
+
+
+async def turns_of_the_loop() -> None:
+    """Let everything happen that needs no answer."""
+    for _ in range(20):
+        await asyncio.sleep(0)
 
 
 @asynccontextmanager
@@ -133,8 +144,8 @@ async def test_one_at_a_time() -> None:
     async with linked() as side:
         first, message = await side.asked(READ)
         second = side.ask(WRITE)
-        await asyncio.sleep(0.02)  # the second must not be sent meanwhile, however long it takes
-        assert len(side.server.requests) == 1
+        await turns_of_the_loop()
+        assert len(side.frames) == 1  # the second is not sent meanwhile, however long it takes
         side.held.say(reply(message, VALUE))
         await first
         message = await side.held.next()
@@ -331,6 +342,43 @@ async def test_a_device_that_answers_nothing_at_all_is_not_there() -> None:
         assert len(side.lost) == 1
 
 
+@settings(deadline=None, max_examples=40)
+@given(st.lists(st.sampled_from(("answered", "timed out", "cancelled", "late ones only")), min_size=1, max_size=12))
+def test_every_answer_goes_to_its_own_request(plan: list[str]) -> None:
+    """The server says with each answer which transaction it is of; the late ones come first, as it answers in order."""
+    asyncio.run(_follow(plan))
+
+
+async def _follow(plan: list[str]) -> None:
+    owed: list[Message] = []
+    async with linked() as side:
+
+        def answer(messages: list[Message]) -> None:
+            for message in messages:
+                own = ObjectRead(READ.address, message.transaction.to_bytes(2, "little"))
+                side.held.say(reply(message, own))
+
+        for step in (*plan, "answered"):
+            task, message = await side.asked(READ, timeout_s=0.01 if step == "timed out" else PATIENCE_S)
+            if step == "answered":
+                answer([*owed, message])
+                owed.clear()
+                got = await task
+                assert isinstance(got, ObjectRead)
+                assert int.from_bytes(got.data, "little") == message.transaction
+                continue
+            if step == "late ones only":
+                answer(owed)
+                owed.clear()
+            if step != "timed out":
+                task.cancel()
+            with pytest.raises((asyncio.CancelledError, NoAnswerError)):
+                await task
+            owed.append(message)
+        assert side.link.is_open
+        assert len(side.server.requests) == len(plan) + 1
+
+
 # -- the fast lane -------------------------------------------------------------------
 
 
@@ -364,11 +412,13 @@ async def test_what_is_urgent_waits_for_no_answer_for_long() -> None:
         assert side.link.late == 1
 
 
-async def test_two_urgent_ones_keep_their_order() -> None:
+async def test_two_urgent_ones_keep_their_order(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An urgent one is not interrupted by another, even without a grace."""
+    monkeypatch.setattr(modbus_link, "URGENT_GRACE_S", 0.0)
     async with linked() as side:
         first, message = await side.asked(STOP, urgent=True)
         second = side.ask(WRITE, urgent=True)
-        await asyncio.sleep(0.05)  # longer than the grace: an urgent one is not interrupted
+        await turns_of_the_loop()
         side.held.say(reply(message, ObjectWritten(STOP.address)))
         await first
         message = await side.held.next()
