@@ -49,6 +49,31 @@ _STATE_NAMES: Final = {AxisState.READY: "ready_to_switch_on", AxisState.NOT_READ
 _WRONG_SIZE: Final = frozenset({Abort.LENGTH, Abort.LENGTH_TOO_HIGH, Abort.LENGTH_TOO_LOW})
 
 
+class SizeSearch:
+    """Looks for the size of an object: ``likely`` ones first, then between those that were too high and too low."""
+
+    def __init__(self, likely: tuple[int, ...]) -> None:
+        self.size = likely[0]
+        self._likely = list(likely[1:])
+        self._least, self._most = 1, MAX_OBJECT_DATA
+        self._told = False
+
+    def refused(self, abort_code: int) -> bool:
+        """The device refused ``size``. True where there is another one to try, which ``size`` is then."""
+        if abort_code not in _WRONG_SIZE:
+            return False
+        if abort_code == Abort.LENGTH_TOO_HIGH:
+            self._most, self._told = self.size - 1, True
+        elif abort_code == Abort.LENGTH_TOO_LOW:
+            self._least, self._told = self.size + 1, True
+        self._likely = [size for size in self._likely if self._least <= size <= self._most]
+        if self._likely:
+            self.size = self._likely.pop(0)
+            return True
+        self.size = (self._least + self._most) // 2
+        return self._told and self._least <= self._most
+
+
 class ModbusDevice:
     """The device at ``peer``. ``tap`` gets every ADU."""
 
@@ -147,18 +172,16 @@ class ModbusDevice:
     async def read(self, address: Address, timeout_s: float | None = None, urgent: bool = False) -> bytes:
         """One object. Raises SdoAbortError, ModbusExceptionError, NoAnswerError, BusLostError, ProtocolError.
 
-        The number of bytes has to be that of the object: where the device refuses the described one, others are tried.
+        The number of bytes has to be that of the object: where the device refuses the described one, it is looked for.
         """
         wait_s = self._timeout_s(address, timeout_s)
-        sizes = self._sizes(address)
-        answer: Answer = AbortAnswer(Abort.LENGTH)
-        for size in sizes:
-            answer = await self.ask(ReadObject(address, size), wait_s, urgent, str(address))
-            if not isinstance(answer, AbortAnswer) or answer.abort_code not in _WRONG_SIZE:
-                break
-        if isinstance(answer, ObjectRead):
-            return answer.data
-        raise self.refusal(answer, str(address))
+        sizes = SizeSearch(self._sizes(address))
+        while True:
+            answer = await self.ask(ReadObject(address, sizes.size), wait_s, urgent, str(address))
+            if isinstance(answer, ObjectRead):
+                return answer.data
+            if not isinstance(answer, AbortAnswer) or not sizes.refused(answer.abort_code):
+                raise self.refusal(answer, str(address))
 
     async def write(
         self, address: Address, data: bytes, timeout_s: float | None = None,

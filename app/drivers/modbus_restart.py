@@ -12,7 +12,7 @@ from typing import Final
 
 from app.drivers.contract import LinkState
 from app.drivers.modbus_device import ModbusDevice
-from app.errors import BusLostError, DeviceError, NoAnswerError, ProtocolError
+from app.errors import DeviceError, NoAnswerError, ProtocolError, UnverifiedError
 from app.model.address import Address
 from app.model.description import Verify
 from app.wire.modbus.device import BOOT, REBOOT, UPTIME
@@ -36,9 +36,9 @@ async def restart(device: ModbusDevice, timeout_s: float) -> None:
             await _uptime_s(device, timeout_s)  # a device that is not there is not told to restart
             start_s = time.monotonic()
             try:
-                await device.write(COMMAND, BOOT, timeout_s, verify=Verify.ACK)
-            except BusLostError:
-                _LOG.info("%s has gone before it acknowledged its restart", device.peer.server)
+                await device.write(COMMAND, BOOT, ASK_TIMEOUT_S, verify=Verify.ACK)
+            except (NoAnswerError, UnverifiedError) as error:
+                _LOG.info("%s did not acknowledge its restart: %s", device.peer.server, error)
             await _gone(device)
             await _back(device, start_s)
     except TimeoutError:

@@ -66,7 +66,8 @@ from tests.drivers.modbus_server import PD4E, Dictionary, Server, reply, serving
 from tests.drivers.wire import stamper
 
 CONTROLWORD, STATUSWORD, MODE = Address(0x6040), Address(0x6041), Address(0x6060)
-WINDOW, TARGET, POSITION = Address(0x6065), Address(0x607A), Address(0x6064)
+UPTIME, WINDOW = Address(0x230F), Address(0x6065)
+TARGET, POSITION = Address(0x607A), Address(0x6064)
 ERROR_HISTORY = 0x1003
 READY_TO_SWITCH_ON = 0x0231
 PATIENCE_S = 10.0
@@ -166,6 +167,38 @@ async def test_a_wrong_size_is_tried_otherwise() -> None:
     async with small(bad) as (driver, _):
         assert await driver.read(1, WINDOW) == b"\x07\x00"
         assert [each.size for each in bad.seen if isinstance(each, ReadObject)] == [4, 2]
+
+
+@pytest.mark.parametrize("length", [1, 3, 4, 18, 100, 240, 241])
+async def test_the_length_of_a_text_is_found(length: int) -> None:
+    """A device that gives a text only where exactly its length is asked for."""
+    text = bytes(range(length))
+
+    class Strict(Bad):
+        async def instead(self, message: Message, request: object) -> bytes | None:
+            assert isinstance(request, ReadObject)
+            if request.size == length:
+                return reply(message, ObjectRead(request.address, text))
+            code = Abort.LENGTH_TOO_HIGH if request.size > length else Abort.LENGTH_TOO_LOW
+            return reply(message, AbortAnswer(code))
+
+    strict = Strict()
+    async with small(strict) as (driver, _):
+        assert await driver.read(1, Address(0x1008)) == text
+        assert len(strict.seen) <= 13
+
+
+async def test_a_size_that_is_not_found_is_the_refusal_of_the_device() -> None:
+    class Odd(Bad):
+        async def instead(self, message: Message, request: object) -> bytes | None:
+            return reply(message, AbortAnswer(Abort.LENGTH))
+
+    odd = Odd()
+    async with small(odd) as (driver, _):
+        with pytest.raises(SdoAbortError) as caught:
+            await driver.read(1, Address(0x1008))
+        assert caught.value.abort_code == Abort.LENGTH
+        assert len(odd.seen) == 5
 
 
 async def test_a_refusal_names_the_object_and_the_state_of_the_device() -> None:
@@ -577,6 +610,56 @@ async def test_a_device_with_fewer_categories_is_not_told_to_save_one_that_it_ha
         with pytest.raises(UsageError):
             await driver.save(1, "no such category")
         assert saving.dictionary.written == []
+
+
+# -- restarts ----------------------------------------------------------------------------
+
+
+class Restarting(Bad):
+    """A device that has run for a thousand seconds; ``way``: how it restarts when it is told to."""
+
+    def __init__(self, way: str) -> None:
+        super().__init__(Dictionary(values={UPTIME: 1000}))
+        self.way = way
+        self.server: Server | None = None
+
+    async def instead(self, message: Message, request: object) -> bytes | None:
+        if not isinstance(request, WriteObject) or request.data != b"boot":
+            return None
+        if self.way == "refuses":
+            return reply(message, AbortAnswer(Abort.DEVICE_STATE))
+        if self.way != "does nothing":
+            self.dictionary.objects[UPTIME] = bytes(4)
+        assert self.server is not None
+        if self.way == "closes without a word":
+            self.server.drop()
+        return b"" if self.way in ("closes without a word", "says nothing") else None
+
+
+@pytest.mark.parametrize("way", ["keeps the connection", "closes without a word", "says nothing"])
+async def test_a_restart_is_known_by_the_uptime(way: str) -> None:
+    restarting = Restarting(way)
+    async with small(restarting) as (driver, server):
+        restarting.server = server
+        await driver.restart(1, timeout_s=PATIENCE_S)
+        assert server.connections == 2
+        assert restarting.count(WriteObject) == 1
+
+
+async def test_a_device_that_does_not_restart_is_not_back() -> None:
+    restarting = Restarting("does nothing")
+    async with small(restarting) as (driver, server):
+        restarting.server = server
+        with pytest.raises(NoAnswerError):
+            await driver.restart(1, timeout_s=2.0)
+
+
+async def test_a_refused_restart_is_told_at_once() -> None:
+    restarting = Restarting("refuses")
+    async with small(restarting) as (driver, server):
+        with pytest.raises(SdoAbortError):
+            await driver.restart(1, timeout_s=PATIENCE_S)
+        assert server.connections == 1
 
 
 # -- what the device really has ------------------------------------------------------------
