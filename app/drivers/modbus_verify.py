@@ -8,10 +8,13 @@ from typing import Final, NamedTuple
 
 from app.model.address import Address
 from app.model.description import Description, Kind
+from app.wire.modbus.image import MAX_ENTRIES, RX_MAPPING, TX_MAPPING
+from app.wire.pdo import MAX_DUMMY_INDEX, parse_mapping_entry
 
 STORE, LOAD = 0x1010, 0x1011
-RX_MAPPING, TX_MAPPING = 0x3502, 0x3602
 _COMMANDS: Final = frozenset({STORE, LOAD})
+_COUNTED: Final = frozenset({0x1003, RX_MAPPING, TX_MAPPING})
+"""Sub-index 0 says how many are in use, not how many there are."""
 
 
 class Deviation(Enum):
@@ -27,10 +30,12 @@ class Deviation(Enum):
     """The object has another number of bytes than its type."""
     NOT_READY = "not_ready"
     """A category of 1010h or 1011h that the description saves or restores reads another value than 1."""
+    MAPPING = "mapping"
+    """An entry of 3502h or 3602h in use maps no described object, or another number of bits than its type has."""
 
 
 class Finding(NamedTuple):
-    """One difference; ``expected`` and ``found`` are numbers: of sub-indices, of bytes, or a value. None: nothing."""
+    """One difference. ``expected`` and ``found`` count sub-indices, bytes or bits, or are a value; None is nothing."""
 
     address: Address
     deviation: Deviation
@@ -47,6 +52,7 @@ def compare(description: Description, dictionary: Mapping[Address, bytes]) -> tu
         *_subs(description, dictionary),
         *_commands(description, dictionary),
         *_objects(description, dictionary),
+        *_mappings(description, dictionary),
         *_extra(description, dictionary),
     ]
     return tuple(sorted(found, key=lambda finding: (finding.address[:2], finding.deviation.value)))
@@ -64,10 +70,6 @@ def _subs(description: Description, dictionary: Mapping[Address, bytes]) -> list
     return findings
 
 
-_COUNTED: Final = frozenset({0x1003, RX_MAPPING, TX_MAPPING})
-"""Sub-index 0 says how many are in use, not how many there are."""
-
-
 def _commands(description: Description, dictionary: Mapping[Address, bytes]) -> list[Finding]:
     findings = []
     for command in (*description.save, *description.load):
@@ -75,6 +77,20 @@ def _commands(description: Description, dictionary: Mapping[Address, bytes]) -> 
         value = None if data is None else int.from_bytes(data, "little")
         if command.address.major in _COMMANDS and value != 1:
             findings.append(Finding(command.address, Deviation.NOT_READY, 1, value))
+    return findings
+
+
+def _mappings(description: Description, dictionary: Mapping[Address, bytes]) -> list[Finding]:
+    findings = []
+    for index in (RX_MAPPING, TX_MAPPING):
+        count = int.from_bytes(dictionary.get(Address(index, 0), b""), "little")
+        for sub in range(1, min(count, MAX_ENTRIES) + 1):
+            place = Address(index, sub)
+            address, bits = parse_mapping_entry(int.from_bytes(dictionary.get(place, b""), "little"))
+            entry = description.entries.get(address)
+            expected = None if entry is None else entry.type.bits
+            if address.major > MAX_DUMMY_INDEX and bits != expected:
+                findings.append(Finding(place, Deviation.MAPPING, expected, bits))
     return findings
 
 

@@ -680,6 +680,8 @@ def test_every_deviation_is_found() -> None:
     device[WINDOW] = b"\0\0"
     device[Address(0x5000, 1)] = b"\7"
     device[Address(0x0021, 1)] = b"\7\0"  # a data type
+    device[Address(0x3502, 1)] = (0x60400020).to_bytes(4, "little")
+    device[Address(0x3602, 2)] = (0x50000108).to_bytes(4, "little")
     del device[POSITION]
     assert set(compare(PD4E, device)) - before == {
         Finding(Address(0x1010, 0), Deviation.SUBS, 13, 2),
@@ -687,6 +689,8 @@ def test_every_deviation_is_found() -> None:
         Finding(WINDOW, Deviation.SIZE, 4, 2),
         Finding(Address(0x5000, 1), Deviation.EXTRA, None, 1),
         Finding(POSITION, Deviation.MISSING, 4, None),
+        Finding(Address(0x3502, 1), Deviation.MAPPING, 16, 32),
+        Finding(Address(0x3602, 2), Deviation.MAPPING, None, 8),
     }
 
 
