@@ -49,8 +49,8 @@ from app.wire.modbus.requests import (
     decode_request,
 )
 from app.wire.records import Outcome, SdoSeen, TransactionSeen, ValueSeen
+from tests.drivers.modbus_rig import VALUES, connected, mapped, twin
 from tests.drivers.modbus_server import Dictionary, dictionary_server
-from tests.drivers.test_modbus import VALUES, connected, mapped, twin
 from tests.drivers.wire import stamper
 
 STATUSWORD, CONTROLWORD = Address(0x6041), Address(0x6040)

@@ -25,10 +25,10 @@ from app.wire.modbus.image import (
 )
 from app.wire.sdo import Abort
 
+_ORDER: Final = WordOrder.HIGH_FIRST
+"""OPEN which register of a 32-bit value comes first; as within a register, and as Modbus has it, the high one."""
 _DUMMIES: Final = {0x0002: 8, 0x0003: 16, 0x0004: 32, 0x0005: 8, 0x0006: 16, 0x0007: 32}
 """Objects that fill a gap, always 0 (manual, 8.5), and their width in bits."""
-ORDER: Final = WordOrder.HIGH_FIRST
-"""OPEN which register of a 32-bit value comes first: no example shows it."""
 
 
 class RefusedRequestError(Exception):
@@ -44,8 +44,8 @@ class ProcessData:
 
     def __init__(self, store: ObjectStore) -> None:
         self._store = store
-        self._rx = process_image(RX_REGISTER, [], ORDER)
-        self._tx = process_image(TX_REGISTER, [], ORDER)
+        self._rx = process_image(RX_REGISTER, [], _ORDER)
+        self._tx = process_image(TX_REGISTER, [], _ORDER)
         for index in (RX_MAPPING, TX_MAPPING):
             for cell in store:
                 if cell.entry.address.major == index:
@@ -54,8 +54,8 @@ class ProcessData:
 
     def reload(self) -> None:
         """Take the mapping as it stands: after power-on, and after a change."""
-        self._rx = process_image(RX_REGISTER, self._entries(RX_MAPPING), ORDER)
-        self._tx = process_image(TX_REGISTER, self._entries(TX_MAPPING), ORDER)
+        self._rx = process_image(RX_REGISTER, self._entries(RX_MAPPING), _ORDER)
+        self._tx = process_image(TX_REGISTER, self._entries(TX_MAPPING), _ORDER)
 
     def _entries(self, index: int) -> list[int]:
         """The mapped entries. A saved mapping that cannot be is none at all."""
