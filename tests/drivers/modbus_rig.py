@@ -27,8 +27,6 @@ TARGET, POSITION = Address(0x607A), Address(0x6064)
 ERROR_HISTORY = 0x1003
 READY_TO_SWITCH_ON = 0x0231
 PATIENCE_S = 10.0
-
-
 FOUR = (4).to_bytes(4, "little")
 STOP, GO = (2).to_bytes(2, "little"), (15).to_bytes(2, "little")
 MOMENT = datetime(2026, 11, 23, 10, 30, 15, 250_000, timezone(timedelta(hours=1)))

@@ -34,16 +34,17 @@ async def test_a_backup_has_every_object_and_holds_the_connection() -> None:
 
 
 class Ending(Bad):
-    """Answers the third message of FC 101 with ``end``, else in its own way."""
+    """Answers the third message of FC 101 with ``end``; what comes after that is "no data available"."""
 
     def __init__(self, end: Answer | None) -> None:
         super().__init__()
         self.end = end
 
     async def instead(self, message: Message, request: object) -> bytes | None:
-        if isinstance(request, ReadDictionary) and self.count(ReadDictionary) == 3:
-            return b"" if self.end is None else reply(message, self.end)
-        return None
+        if not isinstance(request, ReadDictionary) or self.count(ReadDictionary) < 3 or self.end is None:
+            return b"" if self.end is None and self.count(ReadDictionary) == 3 else None
+        end = self.end if self.count(ReadDictionary) == 3 else AbortAnswer(Abort.NO_DATA)
+        return reply(message, end)
 
 
 FIRST = ObjectFrame(Address(0x1000), bytes(4))

@@ -82,6 +82,20 @@ async def test_nothing_is_saved_while_the_axis_is_live_or_the_entry_is_not_ready
         assert saving.dictionary.written == []
 
 
+async def test_an_axis_that_is_started_meanwhile_is_not_saved() -> None:
+    class Starting(Saving):
+        async def instead(self, message: Message, request: object) -> bytes | None:
+            if isinstance(request, WriteObject) and request.address == Address(0x1020, 2):
+                self.dictionary.objects[STATUSWORD] = (0x0637).to_bytes(2, "little")
+            return await super().instead(message, request)
+
+    starting = Starting(0)
+    async with small(starting) as (driver, _):
+        with pytest.raises(PreconditionError):
+            await driver.save(1, "tuning")
+        assert starting.saves == []
+
+
 async def test_a_device_with_fewer_categories_is_not_told_to_save_one_that_it_has_not() -> None:
     saving = Saving(0)
     saving.dictionary.objects[Address(0x1010, 0)] = b"\5"
