@@ -36,6 +36,7 @@ ONLY_IN: dict[str, tuple[str, ...]] = {
     "can": ("drivers/", "twins/", "recording/"),
     "canopen": ("drivers/", "twins/"),
     "pymodbus": (),
+    "pyModbusTCP": (),
     "pyprofibus": ("drivers/profibus.py",),
     "serial": ("drivers/",),
     "viser": ("scene/",),

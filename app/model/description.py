@@ -244,11 +244,13 @@ class Entry:
     """One row of a dictionary: one sub-index, or one PNU.
 
     ``default``, ``minimum``, ``maximum`` and ``also`` (values allowed beyond the limits) are raw values. Where
-    ``node_id``, the node's number is added to the default ($NODEID of CiA 306). ``inferred`` marks what the manual does
-    not print, ``unproven`` the facts that it does not print (empty where it is all of them), and ``origin`` the source
-    that they come from instead, if there is one; ``pdo_side`` the process image it may stand in; ``motion`` an object whose write can set an axis in motion; ``counts`` one that the device itself counts
-    on, so that no old value is put back. An emergency feather command puts the value of ``overwritten_by`` into it, in
-    RAM. ``line`` is the row's line in its file.
+    ``node_id``, the node's number is added to the default ($NODEID of CiA 306). ``save_category`` is what saves it,
+    where a device saves by categories; without one each save command does. ``inferred`` marks what the manual does not
+    print, ``unproven`` which facts these are (empty where all of them), and ``origin`` the source that they come from
+    instead, if there is one. ``pdo_side`` is the process image it may stand in. ``motion`` marks an object whose write
+    can set an axis in motion; ``counts`` one that the device itself counts on, so that no old value is put back. An
+    emergency feather command puts the value of ``overwritten_by`` into it, in RAM. ``line`` is the row's line in its
+    file.
     """
 
     address: Address
@@ -295,7 +297,7 @@ class Entry:
 
     def proves(self, fact: Fact) -> bool:
         """True where the device's own manual prints the fact."""
-        return not self.inferred or bool(self.unproven) and fact not in self.unproven
+        return not self.inferred or (bool(self.unproven) and fact not in self.unproven)
 
     @property
     def title(self) -> str:

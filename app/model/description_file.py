@@ -56,8 +56,8 @@ BUILTIN: Final = {
 }
 
 _TOP_KEYS: Final = frozenset(
-    "schema id version name vendor bus addressing manual match save load variant source unit_rule group bit_table enumeration error "
-    "object".split()
+    "schema id version name vendor bus addressing manual match save load variant source unit_rule group bit_table "
+    "enumeration error object".split()
 )
 _ERROR_KEYS: Final = frozenset(("code", "name", "reaction", "aid", "number", "origin"))
 _OWN_KEYS: Final = frozenset(("index", "ind", "pnu", "kind", "subs", "elements"))
@@ -296,14 +296,14 @@ class _Reader:
             for number, command in enumerate(commands):
                 if command.address not in description.entries:
                     self._say(self._lines.table(key, number), f"{key} address {command.address} is no object")
-        for key, told in (
-            ("bit_table", description.bit_tables),
-            ("enumeration", description.enumerations),
-            ("error", description.errors),
+        for key, origins in (
+            ("bit_table", [table.origin for table in description.bit_tables.values()]),
+            ("enumeration", [table.origin for table in description.enumerations.values()]),
+            ("error", [code.origin for code in description.errors.values()]),
         ):
-            for number, table in enumerate(told.values()):
-                if table.origin is not None and table.origin not in description.sources:
-                    self._say(self._lines.table(key, number), f"source '{table.origin}' does not exist")
+            for number, origin in enumerate(origins):
+                if origin is not None and origin not in description.sources:
+                    self._say(self._lines.table(key, number), f"source '{origin}' does not exist")
 
 
 def _contradictions(description: Description, entry: Entry) -> Iterator[str]:

@@ -139,7 +139,7 @@ def _device_info(description: Description) -> Iterator[str]:
     yield f"RevisionNumber={_number(identity.get(3) or 0)}"
     yield "OrderCode="
     for rate in _BIT_RATES_KBIT:
-        yield f"BaudRate_{rate}={int(rate == _BIT_RATE_KBIT)}"
+        yield f"BaudRate_{rate}={int(description.bus is Bus.CANOPEN and rate == _BIT_RATE_KBIT)}"
     yield "SimpleBootUpMaster=0"
     yield "SimpleBootUpSlave=1"
     yield "Granularity=8"

@@ -71,7 +71,7 @@ class Event(NamedTuple):
     repeats: int = 0
 
 
-_FOLDED: Final = (EventKind.ORPHAN, EventKind.MALFORMED, EventKind.SDO_LOST)
+_FOLDED: Final = (EventKind.ORPHAN, EventKind.MALFORMED, EventKind.SDO_LOST, EventKind.SDO_BROKEN)
 FOLD_NS: Final = 1_000_000_000
 
 

@@ -15,8 +15,8 @@ _CATEGORIES: Final = {1: range(0x0001, 0x10000), 2: COMMUNICATION, 3: range(0x60
 def covers(description: Description | None, command: Address, address: Address) -> bool:
     """True where writing 'save' (or 'load') to ``command`` saves (or sets back) ``address``.
 
-    By the description where it knows the command: saved entries of its category, and those without one. Else by the categories of the
-    standard: 1 all, 2 communication, 3 application; of the categories of a maker nothing is assumed.
+    By the description where it knows the command: saved entries of its category, and those without one. Else by the
+    categories of the standard: 1 all, 2 communication, 3 application; of the categories of a maker nothing is assumed.
     """
     if description is not None:
         entry = description.entries.get(address)
@@ -24,5 +24,7 @@ def covers(description: Description | None, command: Address, address: Address) 
             return False
         known = [c for c in (*description.save, *description.load) if c.address == command]
         if known:
-            return entry is not None and any(c.category is None or entry.save_category in (None, c.category) for c in known)
+            return entry is not None and any(
+                c.category is None or entry.save_category in (None, c.category) for c in known
+            )
     return address.major in _CATEGORIES.get(command.minor, ())

@@ -10,51 +10,31 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final
 
-from app.model.address import Address
 from app.wire.frame import Adu, Direction, Frame
 from app.wire.modbus.adu import Message, decode_adu
 from app.wire.modbus.answers import (
-    AbortAnswer,
-    Answer,
-    ExceptionAnswer,
-    FramesRead,
     ObjectRead,
     ObjectWritten,
-    RegistersRead,
     decode_answer,
 )
 from app.wire.modbus.device import DeviceWatch
-from app.wire.modbus.effects import objects_of, registers_written
 from app.wire.modbus.fields import FormatError
 from app.wire.modbus.image import ProcessImage
 from app.wire.modbus.requests import (
-    ReadObject,
-    ReadRegisters,
-    ReadWriteRegisters,
     Request,
-    WriteArray,
-    WriteObject,
     decode_request,
 )
+from app.wire.modbus.telling import Teller
 from app.wire.modbus.transactions import Connection, Open, Path, path_of
 from app.wire.records import (
     Fault,
     GapSeen,
-    LoadSeen,
     MalformedAduSeen,
     OrphanSeen,
     Outcome,
-    Protocol,
     Record,
-    SaveSeen,
-    SdoAccess,
-    SdoSeen,
     Side,
-    Source,
-    TransactionSeen,
-    ValueSeen,
 )
-from app.wire.sdo_follower import LOAD_INDEX, SAVE_INDEX
 
 _NOTHING: Final[tuple[Record, ...]] = ()
 _MAX_PATHS: Final = 4096
@@ -71,6 +51,7 @@ class ModbusDecoder:
         self._devices: dict[int, DeviceWatch] = {}
         self._connections: dict[tuple[int, str], Connection] = {}
         self._paths: dict[tuple[str, Direction], Path | None] = {}
+        self._teller = Teller(bus, self._device)
 
     def set_server(self, server: str, node: int) -> None:
         """The device ``node`` listens at ``server`` (``host:port``)."""
@@ -93,10 +74,10 @@ class ModbusDecoder:
         try:
             message = decode_adu(adu.data)
             if path.is_request:
-                return self._on_request(path, t_ns, direction, message)
+                return self._on_request(path, t_ns, direction, message, adu)
             return self._on_answer(path, t_ns, message, adu)
         except FormatError as error:
-            return (MalformedAduSeen(t_ns, bus, path.node, adu.link, error.fault, error.offset, adu.data),)
+            return (self._malformed(path, t_ns, adu, error),)
 
     def feed_all(self, frames: Iterable[Frame]) -> list[Record]:
         """Decode many frames in their order."""
@@ -110,7 +91,7 @@ class ModbusDecoder:
         records: list[Record] = []
         for connection in self._connections.values():
             for asked in connection.close():
-                records += self._unanswered(connection.node, t_ns, asked, Outcome.LOST)
+                records += self._teller.unanswered(connection.node, t_ns, asked, Outcome.LOST)
         self._connections.clear()
         for device in self._devices.values():
             device.forget()
@@ -118,16 +99,14 @@ class ModbusDecoder:
 
     # -- both directions -----------------------------------------------------------
 
-    def _on_request(self, path: Path, t_ns: int, direction: Direction, message: Message) -> Sequence[Record]:
+    def _on_request(self, path: Path, t_ns: int, direction: Direction, message: Message, adu: Adu) -> Sequence[Record]:
         request, malformed = _request(message)
         lost = self._abandoned(path) if direction is Direction.TX else []
         lost += self._connection(path).ask(Open(t_ns, direction, message, request))
         if request is not None:
             self._device(path.node).asked(request, path.client)
-        records = [record for asked in lost for record in self._unanswered(path.node, t_ns, asked, Outcome.LOST)]
-        if malformed is not None:
-            raise malformed
-        return records
+        records = [record for asked in lost for record in self._teller.unanswered(path.node, t_ns, asked, Outcome.LOST)]
+        return records if malformed is None else [*records, self._malformed(path, t_ns, adu, malformed)]
 
     def _on_answer(self, path: Path, t_ns: int, message: Message, adu: Adu) -> Sequence[Record]:
         connection = self._connection(path)
@@ -138,137 +117,21 @@ class ModbusDecoder:
         try:
             answer = decode_answer(message.pdu)
         except FormatError as error:
-            malformed = MalformedAduSeen(t_ns, self.bus, path.node, adu.link, error.fault, error.offset, adu.data)
+            malformed = self._malformed(path, t_ns, adu, error)
             if asked is None:
                 return (malformed,)
             connection.settle(asked, None)
-            return (malformed, *self._unanswered(path.node, t_ns, asked, Outcome.BROKEN))
+            return (malformed, *self._teller.unanswered(path.node, t_ns, asked, Outcome.BROKEN))
         if asked is None or asked.request is None or not connection.settle(asked, answer):
             address = answer.address if isinstance(answer, ObjectRead | ObjectWritten) else None
             return (OrphanSeen(t_ns, self.bus, path.node, address, Side.SERVER, message.pdu),)
         device = self._device(path.node)
         restart = device.back(t_ns, self.bus, path.client)
-        records = [*restart, *self._answered(path.node, t_ns, asked, asked.request, answer)]
+        records = [*restart, *self._teller.answered(path.node, t_ns, asked, asked.request, answer)]
         return device.learn(t_ns, self.bus, records)
 
-    # -- ends of requests ------------------------------------------------------------
-
-    def _answered(self, node: int, t_ns: int, asked: Open, request: Request, answer: Answer) -> list[Record]:
-        if isinstance(answer, ExceptionAnswer | AbortAnswer):
-            return self._refused(node, t_ns, asked, request, answer)
-        if isinstance(request, ReadObject) and isinstance(answer, ObjectRead):
-            seen = self._transfer(node, t_ns, asked, request.address, Outcome.DONE, answer.data)
-            whole = request.start == 0 and len(answer.data) == request.size
-            value = ValueSeen(t_ns, self.bus, node, request.address, answer.data, Source.SDO_READ)
-            return [seen, value] if whole else [seen]
-        if isinstance(request, WriteObject):
-            return self._written(node, t_ns, asked, request.address, request.data, whole=request.start == 0)
-        if isinstance(request, WriteArray):
-            frames = request.frames
-            return [r for f in frames for r in self._written(node, t_ns, asked, f.address, f.data, whole=True)]
-        return [self._transaction(node, t_ns, asked, Outcome.DONE), *self._values(node, t_ns, asked, request, answer)]
-
-    def _values(self, node: int, t_ns: int, asked: Open, request: Request, answer: Answer) -> list[Record]:
-        """What FC 101 and 102, and registers, tell of objects."""
-        device, bus = self._device(node), self.bus
-        if isinstance(answer, FramesRead):
-            return [ValueSeen(t_ns, bus, node, f.address, f.data, Source.SDO_READ) for f in answer.frames]
-        records: list[Record] = []
-        for start, registers in registers_written(request):
-            image = device.received.image
-            if image is not None:
-                whole = image.values(start, registers)
-                records += [ValueSeen(t_ns, bus, node, address, data, Source.PDO_RX) for address, data in whole]
-                cut = image.cut(start, len(registers))
-                records += [self._transfer(node, t_ns, asked, address, Outcome.BROKEN) for address in cut]
-        if isinstance(request, ReadRegisters | ReadWriteRegisters) and isinstance(answer, RegistersRead):
-            device.registers_read(t_ns, request.start, answer.registers)
-            for image in (device.sent.image, device.received.image):
-                if image is not None:
-                    whole = image.values(request.start, answer.registers)
-                    records += [ValueSeen(t_ns, bus, node, address, data, Source.PDO_TX) for address, data in whole]
-        return records
-
-    def _written(self, node: int, t_ns: int, asked: Open, address: Address, data: bytes, whole: bool) -> list[Record]:
-        seen = self._transfer(node, t_ns, asked, address, Outcome.DONE if whole else Outcome.BROKEN, data)
-        if not whole:
-            return [seen]
-        value = ValueSeen(t_ns, self.bus, node, address, data, Source.SDO_WRITE)
-        return [seen, value, *self._commanded(node, t_ns, address, data, done=True)]
-
-    def _refused(
-        self, node: int, t_ns: int, asked: Open, request: Request, answer: ExceptionAnswer | AbortAnswer
-    ) -> list[Record]:
-        self._device(node).refused(request)
-        if isinstance(answer, ExceptionAnswer):
-            return [
-                self._transaction(node, t_ns, asked, Outcome.ABORTED, exception=answer.exception),
-                *self._not_commanded(node, t_ns, request),
-            ]
-        objects = objects_of(request)
-        if not objects:
-            return [self._transaction(node, t_ns, asked, Outcome.ABORTED, abort_code=answer.abort_code)]
-        aborted: list[Record] = [
-            self._transfer(node, t_ns, asked, address, Outcome.ABORTED, abort_code=answer.abort_code)
-            for address, _ in objects
-        ]
-        return [*aborted, *self._not_commanded(node, t_ns, request)]
-
-    def _unanswered(self, node: int, t_ns: int, asked: Open, outcome: Outcome) -> Sequence[Record]:
-        """LOST or BROKEN: of what was to be written nothing is known."""
-        request = asked.request
-        if request is None:
-            return _NOTHING
-        device = self._device(node)
-        records: list[Record] = [self._transfer(node, t_ns, asked, a, outcome) for a, _ in objects_of(request)]
-        if not records:
-            records.append(self._transaction(node, t_ns, asked, outcome))
-        image = device.received.image
-        if image is not None:
-            for start, registers in registers_written(request):
-                touched = image.touched(start, len(registers))
-                records += [self._transfer(node, t_ns, asked, address, outcome) for address in touched]
-        device.unsure(request)
-        return (*records, *self._not_commanded(node, t_ns, request))
-
-    # -- records -----------------------------------------------------------------------
-
-    def _transfer(
-        self, node: int, t_ns: int, asked: Open, address: Address, outcome: Outcome,
-        data: bytes | None = None, abort_code: int | None = None,
-    ) -> SdoSeen:  # fmt: skip
-        request = asked.request
-        access = SdoAccess.READ if isinstance(request, ReadObject) else SdoAccess.WRITE
-        protocol = Protocol.OBJECT if isinstance(request, ReadObject | WriteObject) else Protocol.REGISTERS
-        if isinstance(request, WriteArray):
-            protocol = Protocol.FRAMES
-        side = Side.SERVER if outcome is Outcome.ABORTED else None
-        data = data if outcome is Outcome.DONE else None
-        return SdoSeen(
-            t_ns, self.bus, node, access, address, outcome, data, abort_code, side, protocol, t_ns - asked.t_ns,
-            asked.direction,
-        )  # fmt: skip
-
-    def _transaction(
-        self, node: int, t_ns: int, asked: Open, outcome: Outcome,
-        exception: int | None = None, abort_code: int | None = None,
-    ) -> TransactionSeen:  # fmt: skip
-        function, dt_ns = asked.message.function, t_ns - asked.t_ns
-        return TransactionSeen(
-            t_ns, self.bus, node, function, outcome, exception, abort_code, dt_ns, asked.direction
-        )  # fmt: skip
-
-    def _commanded(self, node: int, t_ns: int, address: Address, data: bytes, done: bool) -> tuple[Record, ...]:
-        if address.major == SAVE_INDEX and data == b"save":
-            return (SaveSeen(t_ns, self.bus, node, address, done),)
-        if address.major == LOAD_INDEX and data == b"load":
-            return (LoadSeen(t_ns, self.bus, node, address, done),)
-        return _NOTHING
-
-    def _not_commanded(self, node: int, t_ns: int, request: Request) -> list[Record]:
-        if isinstance(request, ReadObject):
-            return []
-        return [r for a, data in objects_of(request) for r in self._commanded(node, t_ns, a, data, done=False)]
+    def _malformed(self, path: Path, t_ns: int, adu: Adu, error: FormatError) -> MalformedAduSeen:
+        return MalformedAduSeen(t_ns, self.bus, path.node, adu.link, error.fault, error.offset, adu.data)
 
     # -- bookkeeping -------------------------------------------------------------------
 

@@ -100,16 +100,15 @@ class DeviceWatch:
         return restart
 
     def _learn_order(self, t_ns: int, value: ValueSeen) -> None:
-        image, read = self.sent.image, self._registers
-        if self.sent.order is not None or image is None or read is None or value.address not in image.places:
+        read = self._registers
+        if self.sent.order is not None or read is None or t_ns - read[0] > _FRESH_NS:
             return
-        read_ns, start, registers = read
-        span = image.places[value.address]
-        first = span.start - start
-        if t_ns - read_ns > _FRESH_NS or first < 0 or first + span.quantity > len(registers):
-            return
-        order = shown_order(value.data, registers[first : first + span.quantity])
-        self.sent.order = self.received.order = order
+        _, start, registers = read
+        for image in (self.sent.image, self.received.image):
+            span = None if image is None else image.places.get(value.address)
+            if span is not None and start <= span.start and span.start + span.quantity <= start + len(registers):
+                order = shown_order(value.data, registers[span.start - start :][: span.quantity])
+                self.sent.order = self.received.order = order
 
     def _restarted(self, t_ns: int, bus: str) -> Sequence[Record]:
         self._told_to_boot = None

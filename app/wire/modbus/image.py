@@ -85,12 +85,6 @@ class ProcessImage:
         first, last = 2 * (start - self.start), 2 * (start + quantity - self.start)
         return [slot.address for slot in self.slots if slot.start < last and first < slot.stop]
 
-    def cut(self, start: int, quantity: int) -> list[Address]:
-        """Objects of which they hold a part only."""
-        last = start + quantity
-        whole = {a for a, span in self.places.items() if start <= span.start and span.start + span.quantity <= last}
-        return [address for address in self.touched(start, quantity) if address not in whole]
-
     def registers(self, values: MappingOf[Address, bytes]) -> tuple[int, ...]:
         """All registers, from ``values`` least significant byte first; dummies are 0.
 

@@ -4832,7 +4832,7 @@ export interface components {
              * Restore
              * @enum {string}
              */
-            restore: "copy" | "unit" | "factory" | "never";
+            restore: "copy" | "unit" | "factory" | "network" | "never";
             /**
              * State
              * @enum {string}
@@ -5428,7 +5428,7 @@ export interface components {
              * Restore
              * @enum {string}
              */
-            restore: "copy" | "unit" | "factory" | "never";
+            restore: "copy" | "unit" | "factory" | "network" | "never";
             /** Unit */
             unit: number;
         };
@@ -8563,7 +8563,7 @@ export interface components {
             /** Now Shown */
             now_shown: string | null;
             /** Restore Class */
-            restore_class: ("copy" | "unit" | "factory" | "never") | null;
+            restore_class: ("copy" | "unit" | "factory" | "network" | "never") | null;
             /**
              * Treatment
              * @enum {string}

@@ -27,7 +27,7 @@ from app.wire.modbus.answers import (
 from app.wire.modbus.decoder import ModbusDecoder
 from app.wire.modbus.frames import ObjectFrame
 from app.wire.modbus.functions import Function, Phase
-from app.wire.modbus.image import RX_MAPPING, TX_MAPPING
+from app.wire.modbus.image import RX_MAPPING, TX_MAPPING, WordOrder
 from app.wire.modbus.requests import (
     ReadDictionary,
     ReadObject,
@@ -111,6 +111,12 @@ def test_part_of_an_object_is_no_value(decoder: ModbusDecoder) -> None:
     assert values(records) == []
 
 
+def test_a_text_may_be_shorter_than_what_was_asked_for(decoder: ModbusDecoder) -> None:
+    name = Address(0x1008)
+    records = decoder.feed_all(Client().exchange(ReadObject(name, 241), ObjectRead(name, b"PD4-E591L42-E-65-4")))
+    assert [record.data for record in records if isinstance(record, ValueSeen)] == [b"PD4-E591L42-E-65-4"]
+
+
 def test_a_write_by_a_foreign_master(decoder: ModbusDecoder) -> None:
     frames = Client(OTHER, ours=False).exchange(WriteObject(CONTROLWORD, b"\x80\x00"), ObjectWritten(CONTROLWORD))
     records = decoder.feed_all(frames)
@@ -147,8 +153,9 @@ def test_an_abort_names_its_object(decoder: ModbusDecoder) -> None:
 
 
 def test_an_exception_names_its_function(decoder: ModbusDecoder) -> None:
-    records = decoder.feed_all(Client().exchange(READ, ExceptionAnswer(43, 1)))
-    assert records == [TransactionSeen(2 * MS, BUS, NODE, 43, Outcome.ABORTED, 1, None, MS, Direction.TX)]
+    for exception in (1, 4):
+        records = decoder.feed_all(Client().exchange(READ, ExceptionAnswer(43, exception)))
+        assert records == [TransactionSeen(2 * MS, BUS, NODE, 43, Outcome.ABORTED, exception, None, MS, Direction.TX)]
 
 
 def test_arrays(decoder: ModbusDecoder) -> None:
@@ -158,10 +165,15 @@ def test_arrays(decoder: ModbusDecoder) -> None:
     assert values(records) == [(Address(0x2400, sub), sub, Source.SDO_WRITE) for sub in (1, 2)]
     assert {seen.protocol for seen in transfers(records)} == {Protocol.FRAMES}
     refused = decoder.feed_all(client.exchange(request, AbortAnswer(0x06010002)))
+    assert [seen.abort_code for seen in refused if isinstance(seen, TransactionSeen)] == [0x06010002]
     assert [(seen.address.minor, seen.outcome) for seen in transfers(refused)] == [
-        (1, Outcome.ABORTED),
-        (2, Outcome.ABORTED),
+        (1, Outcome.BROKEN),  # it may have been written before the other one was refused
+        (2, Outcome.BROKEN),
     ]
+    one = WriteArray(Phase.START, frames[:1])
+    (seen,) = decoder.feed_all(client.exchange(one, AbortAnswer(0x06010002)))
+    assert isinstance(seen, SdoSeen)
+    assert (seen.outcome, seen.abort_code) == (Outcome.ABORTED, 0x06010002)
 
 
 def test_the_whole_dictionary(decoder: ModbusDecoder) -> None:
@@ -202,6 +214,19 @@ def test_what_was_refused_was_not_written(mapped: ModbusDecoder) -> None:
     assert records == [TransactionSeen(records[0].t_ns, BUS, NODE, 6, Outcome.ABORTED, 2, None, MS, Direction.TX)]
 
 
+@pytest.mark.parametrize(("exception", "unsure"), [(1, 0), (2, 0), (3, 2), (4, 2)])
+def test_what_was_refused_half_way_is_unknown(mapped: ModbusDecoder, exception: int, unsure: int) -> None:
+    records = mapped.feed_all(Client().exchange(CYCLE, ExceptionAnswer(23, exception)))
+    assert [seen.outcome for seen in transfers(records)] == [Outcome.BROKEN] * unsure
+
+
+def test_a_long_value_of_unknown_order_is_written_but_not_known(mapped: ModbusDecoder) -> None:
+    write = WriteRegisters(6002, (5, 0))
+    records = mapped.feed_all(Client().exchange(write, RegistersWritten(6002, 2)))
+    assert values(records) == []
+    assert [(seen.address, seen.outcome) for seen in transfers(records)] == [(TARGET, Outcome.BROKEN)]
+
+
 def test_half_of_an_object_is_no_value(mapped: ModbusDecoder) -> None:
     records = mapped.feed_all(Client().exchange(WriteRegister(6002, 1), WriteRegister(6002, 1)))
     assert values(records) == []
@@ -232,6 +257,16 @@ def test_the_order_of_words_is_learned_from_the_device(mapped: ModbusDecoder) ->
     assert (POSITION, 0x00010203, Source.PDO_TX) in values(mapped.feed_all(client.exchange(read, registers)))
     write = WriteRegisters(6002, (5, 0))
     assert values(mapped.feed_all(client.exchange(write, RegistersWritten(6002, 2)))) == [(TARGET, 5, Source.PDO_RX)]
+
+
+def test_the_order_of_words_is_learned_from_what_the_device_takes_too(mapped: ModbusDecoder) -> None:
+    client = Client().at(10_000 * MS)
+    read, registers = ReadRegisters(6002, 2), RegistersRead((0x0203, 0x0001))
+    target = ObjectRead(TARGET, (0x00010203).to_bytes(4, "little"))
+    mapped.feed_all([*client.exchange(read, registers), *client.exchange(ReadObject(TARGET, 4), target)])
+    image = mapped.image(NODE, sent_by_device=True)
+    assert image is not None
+    assert image.order is WordOrder.LOW_FIRST
 
 
 def test_an_old_reading_shows_no_order(mapped: ModbusDecoder) -> None:
@@ -379,6 +414,8 @@ def test_malformed_messages_say_where(decoder: ModbusDecoder) -> None:
     (bad,) = decoder.feed(client.ask(bytes.fromhex("2B 0D 02 00 01 6041 00 0000 0002")))
     assert isinstance(bad, MalformedAduSeen)
     assert (bad.fault, bad.offset, bad.node, bad.link) == (Fault.OPTION, 9, NODE, f"{US}>{SERVER}")
+    records = decoder.feed_all([client.ask(WRITE, 9), client.ask(b"\3\0", 9)])
+    assert [type(record) for record in records] == [SdoSeen, MalformedAduSeen]  # what it replaces is lost all the same
     records = decoder.feed_all([client.ask(WRITE), client.answer(bytes.fromhex("2B 0D 01"))])
     assert isinstance(records[0], MalformedAduSeen)
     assert records[0].offset == 10

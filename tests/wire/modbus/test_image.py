@@ -47,8 +47,6 @@ def test_bytes_of_page_115() -> None:
 def test_a_window_gives_what_lies_wholly_in_it() -> None:
     assert [a for a, _ in TX.values(5001, (2, 1))] == [MODE]
     assert TX.touched(5001, 2) == [MODE, POSITION]
-    assert TX.cut(5001, 2) == [POSITION]
-    assert TX.cut(5000, 7) == []
     assert TX.values(6000, (1, 2, 3)) == []
     assert [a for a, _ in TX.values(4990, (0,) * 11)] == [STATUSWORD]
 

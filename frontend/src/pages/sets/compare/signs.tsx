@@ -10,6 +10,7 @@ import {
   IconEqualNot,
   IconEyeOff,
   IconFileOff,
+  IconNetwork,
   IconPlugOff,
   IconRulerOff,
 } from "@tabler/icons-react";
@@ -61,7 +62,12 @@ export function AbsenceText({ why, reason = "" }: { why: Absence; reason?: strin
   );
 }
 
-const CLASS_SIGNS = { unit: IconAnchor, factory: IconBuildingFactory2, never: IconBan } as const;
+const CLASS_SIGNS = {
+  unit: IconAnchor,
+  factory: IconBuildingFactory2,
+  network: IconNetwork,
+  never: IconBan,
+} as const;
 
 /** What a restore makes of the object, where it is not simply copied. */
 export function ClassChip({ restore }: { restore: RowDoc["restore"] }) {
