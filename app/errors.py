@@ -92,6 +92,7 @@
     │       └── FaultValueError             one of its values is out of range; names the limits
     ├── DeviceError                exit 4   the device answered and refused
     │   ├── SdoAbortError                   CiA 301 abort code
+    │   ├── ModbusExceptionError            Modbus exception code
     │   └── IdentityError                   another device than expected answered
     ├── NoAnswerError              exit 5   nothing came in time
     │   ├── BusLostError                    the adapter or its server is gone
@@ -694,6 +695,15 @@ class SdoAbortError(DeviceError):
     def abort_code(self) -> int:
         """The 32-bit abort code."""
         return int(self.details["abort_code"])
+
+
+class ModbusExceptionError(DeviceError):
+    """The device refused a Modbus request with an exception code (V1.1b3, chapter 7).
+
+    Details: node, address, function, exception (int), text_key_reason.
+    """
+
+    code = "modbus_exception"
 
 
 class IdentityError(DeviceError):

@@ -36,6 +36,7 @@ ONLY_IN: dict[str, tuple[str, ...]] = {
     "can": ("drivers/", "twins/", "recording/"),
     "canopen": ("drivers/", "twins/"),
     "pymodbus": (),
+    "pyModbusTCP": (),
     "pyprofibus": ("drivers/profibus.py",),
     "serial": ("drivers/",),
     "viser": ("scene/",),
@@ -54,7 +55,7 @@ FORBIDDEN = {
 }
 PURE = ("model", "wire", "twins")
 CLOCKS = {"time", "monotonic", "monotonic_ns", "time_ns", "perf_counter", "perf_counter_ns", "sleep"}
-EDGES = {"twins/line_thread.py", "twins/socketcand_server.py"}
+EDGES = {"twins/paced_thread.py", "twins/line_thread.py", "twins/socketcand_server.py"}
 """Where twins meet real time: the pacing thread and the TCP server."""
 
 

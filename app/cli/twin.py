@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import argparse
 import secrets
-import signal
 import sys
-import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from app.cli import twin_fault, twin_record
+from app.cli import twin_fault, twin_pd4e, twin_record
 from app.cli.arguments import bitrate, milliseconds, seed, wind
 from app.cli.output import Output
-from app.cli.runtime import spare_collector
+from app.cli.runtime import spare_collector, stop_event
 from app.errors import BusOpenError, UsageError
 from app.model.address import is_decimal
 from app.model.bundled import bundled_folder
@@ -57,6 +55,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         "--fault", action="append", default=[], metavar="KIND@5s,blade=2,...", help="put a fault in; may be repeated"
     )
     oat.set_defaults(run=run)
+    twin_pd4e.add_parser(kinds)
     twin_fault.add_parser(kinds)
     twin_record.add_parser(kinds)
 
@@ -66,11 +65,7 @@ def run(arguments: argparse.Namespace, output: Output) -> int:
     sys.setswitchinterval(SWITCH_INTERVAL_S)
     spare_collector()
     host, port = _address(arguments.can)
-    stop = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: stop.set())
-    if arguments.while_stdin:
-        threading.Thread(target=_end_with_stdin, args=(stop,), daemon=True).start()
+    stop = stop_event(while_stdin=arguments.while_stdin)
     twins = _build(arguments)
     for problem in twins.turbine.problems:
         output.say("cli.twin_problem", reason=problem)
@@ -157,12 +152,6 @@ def _injection(instructor: Instructor, order: FaultOrder) -> Callable[[int], Non
         instructor.inject(order)
 
     return inject
-
-
-def _end_with_stdin(stop: threading.Event) -> None:
-    """A caller that was killed closes our input; twins without a caller would keep its port for ever."""
-    sys.stdin.read()
-    stop.set()
 
 
 def _announce(told: _Told, control: str, token: str, output: Output) -> None:

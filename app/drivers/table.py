@@ -10,6 +10,7 @@ from app.model.description import Bus
 
 DRIVERS: Final[dict[Bus, tuple[str, str]]] = {
     Bus.CANOPEN: ("app.drivers.canopen", "CanOpenDriver"),
+    Bus.MODBUS_TCP: ("app.drivers.modbus", "ModbusDriver"),
 }
 """Module and class of each driver."""
 

@@ -8,7 +8,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
-from app.errors import HubsideError, SdoAbortError
+from app.errors import HubsideError, ModbusExceptionError, SdoAbortError
 
 LANGUAGES: Final = ("en", "de")
 
@@ -69,8 +69,10 @@ class _Dashes(dict[str, str]):
 
 
 def error_text(texts: Texts, error: HubsideError) -> str:
-    """The operator's text of an error; an SDO abort code is given in words, the number behind."""
+    """The operator's text of an error; abort and exception codes are given in words, the number behind."""
     details = dict(error.details)
+    if isinstance(error, ModbusExceptionError):
+        details["reason"] = texts(str(details.get("text_key_reason", "modbus.exception.unknown")))
     if isinstance(error, SdoAbortError):
         words = texts(str(details.get("text_key_reason", "abort.unknown")))
         details["reason"] = f"{words} (abort code {error.abort_code:08X}h)"

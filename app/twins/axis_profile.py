@@ -56,6 +56,11 @@ class SetPoints:
         """No further target waits."""
         return self._waiting is None
 
+    @property
+    def waiting(self) -> Target | None:
+        """The target that follows the active one."""
+        return self._waiting
+
     def clear(self) -> None:
         """Forget all targets."""
         self.active = self._waiting = None

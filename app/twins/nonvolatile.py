@@ -28,7 +28,8 @@ class NonVolatile:
     """The memory of one device and the objects that command it.
 
     ``delivered`` is what the memory holds when there is no file yet. ``duration_ns`` is how long a save takes.
-    ``failed`` is called when it could not be written.
+    ``failed`` is called when it could not be written. Where the device does not obey 1010h and 1011h as CiA 301 has it,
+    ``commanded`` is False, and the device itself calls ``save`` and ``discard``.
     """
 
     def __init__(
@@ -39,6 +40,7 @@ class NonVolatile:
         duration_ns: int,
         delivered: dict[Address, bytes],
         failed: Callable[[], None] = lambda: None,
+        commanded: bool = True,
     ) -> None:
         self._store = store
         self._file = file
@@ -58,11 +60,9 @@ class NonVolatile:
             self.memory = Memory(saved=dict(delivered))
         self._remanent: tuple[Cell, ...] = ()
         self._drop_unknown()
-        for index, signature, act in (
-            (_SAVE_INDEX, SAVE_SIGNATURE, self._save),
-            (_LOAD_INDEX, LOAD_SIGNATURE, self._load),
-        ):
-            self._install(index, signature, act)
+        if commanded:
+            self._install(_SAVE_INDEX, SAVE_SIGNATURE, self.save)
+            self._install(_LOAD_INDEX, LOAD_SIGNATURE, self.discard)
 
     def keep_remanent(self, cells: Iterable[Cell]) -> None:
         """Name the values that outlive a restart without being saved, and give them what was kept."""
@@ -126,7 +126,8 @@ class NonVolatile:
 
         return start
 
-    def _save(self, wanted: Callable[[Entry], bool]) -> None:
+    def save(self, wanted: Callable[[Entry], bool]) -> None:
+        """Copy the wanted RAM values into the memory. Raises RefusedAccessError where it takes nothing."""
         saved = dict(self.memory.saved)
         for cell in self._store:
             entry = cell.entry
@@ -135,7 +136,8 @@ class NonVolatile:
                 saved[entry.address] = encode_raw(entry.type, cell.raw)
         self._commit(saved)
 
-    def _load(self, wanted: Callable[[Entry], bool]) -> None:
+    def discard(self, wanted: Callable[[Entry], bool]) -> None:
+        """Empty the memory of the wanted values. Raises RefusedAccessError where it takes nothing."""
         saved = self.memory.saved.items()
         self._commit({address: data for address, data in saved if not wanted(self._store.at(address).entry)})
 

@@ -226,7 +226,9 @@ class ObjectStore:
             last[address.major] = max(last.get(address.major, 0), address.minor)
         for index, count in last.items():
             cell = self.find(index)
-            if index >= _FIRST_OF_MAKER and cell is not None and count and cell.raw != count:
+            if cell is None or cell.entry.access.writable:
+                continue  # a mapping's own count is a value
+            if index >= _FIRST_OF_MAKER and count and cell.raw != count:
                 cell.source = _constant(count)
 
 

@@ -9,8 +9,9 @@ from typing import Any, Final, NamedTuple
 
 from app.model.description import Description
 from app.wire.emcy import NO_ERROR, emcy_text_key
-from app.wire.records import EmcySeen, Outcome, SdoAccess, SdoSeen
-from app.wire.sdo import abort_text_key
+from app.wire.modbus.functions import exception_text_key
+from app.wire.records import EmcySeen, Outcome, SdoAccess, SdoSeen, TransactionSeen
+from app.wire.sdo import Abort, abort_text_key
 
 
 class EventKind(Enum):
@@ -30,6 +31,8 @@ class EventKind(Enum):
     SAVE_FAILED = "save_failed"
     LOADED = "loaded"
     LOAD_FAILED = "load_failed"
+    REQUEST_REFUSED = "request_refused"
+    """A Modbus request that is no access to one object was refused."""
     STORED_DIFFERS = "stored_differs"
     """What a device holds after a restart is not what it acknowledged to save."""
     GAP = "gap"
@@ -68,7 +71,7 @@ class Event(NamedTuple):
     repeats: int = 0
 
 
-_FOLDED: Final = (EventKind.ORPHAN, EventKind.MALFORMED, EventKind.SDO_LOST)
+_FOLDED: Final = (EventKind.ORPHAN, EventKind.MALFORMED, EventKind.SDO_LOST, EventKind.SDO_BROKEN)
 FOLD_NS: Final = 1_000_000_000
 
 
@@ -143,6 +146,19 @@ def tell_sdo(seen: SdoSeen) -> Told | None:
     if seen.outcome is Outcome.BROKEN:
         return Told(EventKind.SDO_BROKEN, severity, EventKind.SDO_BROKEN.text_key, details)
     return None
+
+
+def tell_transaction(seen: TransactionSeen) -> Told | None:
+    """What a Modbus transaction is worth: nothing but its refusal. That FC 101 has no more data is no refusal."""
+    if seen.outcome is not Outcome.ABORTED or seen.abort_code == Abort.NO_DATA:
+        return None
+    code = seen.exception if seen.abort_code is None else seen.abort_code
+    if code is None:
+        return None
+    reason_key = exception_text_key(code) if seen.abort_code is None else abort_text_key(code)
+    kind = EventKind.REQUEST_REFUSED
+    details = {"function": seen.function, "code": code, "reason_key": reason_key}
+    return Told(kind, Severity.WARNING, kind.text_key, details)
 
 
 def tell_emcy(seen: EmcySeen, description: Description | None) -> Told:

@@ -14,7 +14,7 @@ from typing import Any, Final, NamedTuple
 from app.model.address import Address
 from app.model.description import Description
 from app.wire import sdo
-from app.wire.events import Event, EventKind, EventLog, Severity, Told, tell_emcy, tell_sdo
+from app.wire.events import Event, EventKind, EventLog, Severity, Told, tell_emcy, tell_sdo, tell_transaction
 from app.wire.frame import Direction
 from app.wire.live_node import LiveNode, NodeView
 from app.wire.memory import Cell, Reading, Stored
@@ -25,11 +25,13 @@ from app.wire.records import (
     EnvironmentSeen,
     GapSeen,
     LoadSeen,
+    MalformedAduSeen,
     MalformedSeen,
     NmtCommandSeen,
     OrphanSeen,
     Outcome,
     Record,
+    RestartSeen,
     SaveSeen,
     SdoAccess,
     SdoSeen,
@@ -37,6 +39,7 @@ from app.wire.records import (
     Source,
     StateSeen,
     SyncSeen,
+    TransactionSeen,
     ValueSeen,
 )
 from app.wire.sdo_follower import LOAD_INDEX, SAVE_INDEX
@@ -104,6 +107,9 @@ class LiveState:
             EnvironmentSeen: self._on_environment,
             GapSeen: self._on_gap,
             MalformedSeen: self._on_malformed,
+            TransactionSeen: self._on_transaction,
+            RestartSeen: self._on_restart,
+            MalformedAduSeen: self._on_malformed_adu,
         }
 
     # -- writing -----------------------------------------------------------------
@@ -391,6 +397,31 @@ class LiveState:
         kind = EventKind.MALFORMED
         details = {"can_id_hex": f"{seen.can_id:X}h", "fault_key": seen.fault.text_key, "data": seen.data.hex()}
         self._add_event(seen.t_ns, seen.bus, seen.node, Told(kind, Severity.WARNING, kind.text_key, details))
+
+    def _on_transaction(self, seen: TransactionSeen) -> None:
+        node = self._node(seen.bus, seen.node)
+        if seen.outcome in (Outcome.DONE, Outcome.ABORTED):
+            self._see(node)
+        if seen.client is Direction.RX and node.seen:
+            node.other_client_ns = seen.t_ns
+            self._touch_node(node)
+        told = tell_transaction(seen)
+        if told is not None and node.seen:
+            self._add_event(seen.t_ns, seen.bus, seen.node, told)
+
+    def _on_restart(self, seen: RestartSeen) -> None:
+        """As a boot-up, of a device that has no NMT state."""
+        node = self._node(seen.bus, seen.node)
+        self._touch_cells(node.memory.boot_up(communication_only=False))
+        node.boot_ns, node.boots = seen.t_ns, node.boots + 1
+        self._see(node)
+        self._touch_node(node)
+        self._tell(node, seen.t_ns, EventKind.BOOT_UP, Severity.INFO, boots=node.boots)
+
+    def _on_malformed_adu(self, seen: MalformedAduSeen) -> None:
+        details = {"fault_key": seen.fault.text_key, "offset": seen.offset, "link": seen.link, "data": seen.data.hex()}
+        told = Told(EventKind.MALFORMED, Severity.WARNING, "event.malformed_adu", details)
+        self._add_event(seen.t_ns, seen.bus, seen.node, told)
 
     # -- bookkeeping -------------------------------------------------------------
 

@@ -35,11 +35,17 @@ class SdoAccess(Enum):
 
 
 class Protocol(Enum):
-    """The SDO protocol used (CiA 301, 7.2.4.2)."""
+    """The SDO protocol used (CiA 301, 7.2.4.2), or the function of Modbus that stands for one."""
 
     EXPEDITED = "expedited"
     SEGMENTED = "segmented"
     BLOCK = "block"
+    OBJECT = "object"
+    """One object by Modbus FC 43, an SDO transfer in one message each way."""
+    FRAMES = "frames"
+    """One of many objects by Modbus FC 103."""
+    REGISTERS = "registers"
+    """Mapped into registers that were written by Modbus FC 6, 16 or 23."""
 
 
 class Outcome(Enum):
@@ -81,6 +87,16 @@ class Fault(Enum):
     """The CRC of a block transfer does not fit its data."""
     PDO_LENGTH = "pdo_length"
     """A PDO is shorter than its mapping."""
+    PROTOCOL = "protocol"
+    """The protocol identifier of a Modbus TCP header is not 0."""
+    FUNCTION = "function"
+    """A function code of Modbus that the device does not document."""
+    COUNT = "count"
+    """A count that does not fit its limits, or what it counts."""
+    FIELD = "field"
+    """A field has a value that the protocol does not know."""
+    OPTION = "option"
+    """An option that the device does not have."""
 
     @property
     def text_key(self) -> str:
@@ -230,6 +246,44 @@ class MalformedSeen(NamedTuple):
     data: bytes
 
 
+class TransactionSeen(NamedTuple):
+    """A Modbus request that is no access to one object (those are SdoSeen), or that an exception code refused.
+
+    ``function`` is its function code. ``exception`` and ``abort_code`` are None unless ABORTED by such a one. ``dt_ns``
+    runs from the request to the end. ``client`` is TX where the request was ours.
+    """
+
+    t_ns: int
+    bus: str
+    node: int
+    function: int
+    outcome: Outcome
+    exception: int | None
+    abort_code: int | None
+    dt_ns: int
+    client: Direction
+
+
+class RestartSeen(NamedTuple):
+    """A device that sends no boot-up message has started anew: its uptime fell, or it was told to and is back."""
+
+    t_ns: int
+    bus: str
+    node: int
+
+
+class MalformedAduSeen(NamedTuple):
+    """A Modbus ADU makes no sense from its byte ``offset`` on. ``link`` is the connection that carried it."""
+
+    t_ns: int
+    bus: str
+    node: int
+    link: str
+    fault: Fault
+    offset: int
+    data: bytes
+
+
 Record = (
     ValueSeen
     | SdoSeen
@@ -244,4 +298,7 @@ Record = (
     | EnvironmentSeen
     | GapSeen
     | MalformedSeen
+    | TransactionSeen
+    | RestartSeen
+    | MalformedAduSeen
 )

@@ -55,12 +55,23 @@ class Abort(IntEnum):
     NO_DATA = 0x08000024
 
 
+class GatewayAbort(IntEnum):
+    """Abort codes beyond CiA 301 of a gateway to an object dictionary (PD4-E manual, pages 105, 109 and 112)."""
+
+    GATEWAY_NO_ERROR = 0xFFFF0000
+    GATEWAY_COMMAND = 0xFFFF0003
+    GATEWAY_ACCESS = 0xFFFF0008
+    GATEWAY_PARAMETER = 0xFFFF000E
+    GATEWAY_SERVICE = 0xFFFF1003
+    GATEWAY_SEQUENCE = 0xFFFF1004
+
+
+_ABORT_NAMES: Final = {code.value: code.name.lower() for code in (*Abort, *GatewayAbort)}
+
+
 def abort_text_key(code: int) -> str:
     """Text key of an abort code; unknown codes share one."""
-    try:
-        return f"abort.{Abort(code).name.lower()}"
-    except ValueError:
-        return "abort.unknown"
+    return f"abort.{_ABORT_NAMES.get(code, 'unknown')}"
 
 
 class Command(IntEnum):

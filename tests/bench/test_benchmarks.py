@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from bench import __main__ as command
-from bench import fleet, latency, record
+from bench import fc101, fleet, latency, record
 from bench._cpu import tree_cpu_s
 from bench._load import PMC_NODES, frames, position_of
 from bench._result import Result
@@ -33,6 +33,14 @@ def test_a_fleet_is_compared_alike_by_both(tmp_path: Path) -> None:
     again = fleet.measure(sets=60, parameters=40, rounds=1, cache=tmp_path)
     assert len(list(tmp_path.iterdir())) == 1, "what was generated is kept"
     assert again.lines[0] == done.lines[0]
+
+
+def test_a_dictionary_is_read_alike_by_fc_101_and_one_by_one() -> None:
+    done = fc101.measure(rounds=1)
+    assert not done.shortfalls
+    objects, single, whole = (int(re.search(pattern, line)[1]) for pattern, line in zip(  # type: ignore[index]
+        (r"^(\d+) objects", r"in (\d+) requests", r"in (\d+) requests"), done.lines, strict=True))  # fmt: skip
+    assert objects == single > 20 * whole
 
 
 def test_every_position_on_the_bus_reaches_the_client() -> None:

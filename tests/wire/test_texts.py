@@ -9,15 +9,18 @@ import pytest
 from app.model.texts import LANGUAGES, load_texts
 from app.wire import emcy
 from app.wire.events import EventKind
+from app.wire.modbus.functions import ModbusException, exception_text_key
 from app.wire.nmt import NmtCommand, NmtState
 from app.wire.records import Fault
-from app.wire.sdo import Abort, abort_text_key
+from app.wire.sdo import Abort, GatewayAbort, abort_text_key
 
 KEYS = (
-    *(abort_text_key(code) for code in Abort),
+    *(abort_text_key(code) for code in (*Abort, *GatewayAbort)),
+    *(exception_text_key(code) for code in (0, *ModbusException)),
     abort_text_key(0),
     *(f"emcy.{code:04x}" for code in emcy.ERROR_CLASSES),
     "emcy.unknown",
+    "event.malformed_adu",
     *(item.text_key for enum in (NmtState, NmtCommand, Fault, EventKind) for item in enum),
 )
 

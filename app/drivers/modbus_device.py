@@ -1,0 +1,292 @@
+"""One Modbus TCP device: its connection, opened again whenever it is lost, and its objects, read and written by FC 43.
+
+Nothing is asked twice by itself, but a read that had to make room for an urgent request.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable
+from typing import Final
+
+from app.drivers.contract import LinkState, Written
+from app.drivers.modbus_config import ModbusPeer
+from app.drivers.modbus_link import Attempt, InterruptedRequest, ModbusLink
+from app.drivers.urgent import UrgentCommands
+from app.errors import (
+    BusLostError,
+    BusOpenError,
+    DeviceError,
+    HubsideError,
+    ModbusExceptionError,
+    NoAnswerError,
+    OvertakenError,
+    ProtocolError,
+    RefusedError,
+    SdoAbortError,
+    UnverifiedError,
+)
+from app.model.address import Address
+from app.model.axis_state import AxisState
+from app.model.description import Description, Verify
+from app.wire.frame import Frame, Stamper
+from app.wire.modbus.answers import AbortAnswer, Answer, ExceptionAnswer, ObjectRead
+from app.wire.modbus.functions import exception_text_key
+from app.wire.modbus.requests import MAX_OBJECT_DATA, ReadObject, Request, WriteObject
+from app.wire.sdo import Abort, abort_text_key
+
+_LOG: Final = logging.getLogger(__name__)
+DEFAULT_TIMEOUT_S: Final = 1.0
+SAVE_TIMEOUT_S: Final = 10.0
+"""The least time-out of a write to 1010h or 1011h: non-volatile memory is slow."""
+STATUSWORD: Final = Address(0x6041)
+_SLOW: Final = frozenset({0x1010, 0x1011})
+_REOPEN_S: Final = (0.1, 0.2, 0.5, 1.0, 2.0)
+_SIZES: Final = (4, 2, 1, 8, MAX_OBJECT_DATA)
+"""Bytes that are asked for where the size is not known, or another one than described; texts may have fewer."""
+_STATE_NAMES: Final = {AxisState.READY: "ready_to_switch_on", AxisState.NOT_READY: "not_ready_to_switch_on"}
+_WRONG_SIZE: Final = frozenset({Abort.LENGTH, Abort.LENGTH_TOO_HIGH, Abort.LENGTH_TOO_LOW})
+
+
+class SizeSearch:
+    """Looks for the size of an object: ``likely`` ones first, then between those that were too high and too low."""
+
+    def __init__(self, likely: tuple[int, ...]) -> None:
+        self.size = likely[0]
+        self._likely = list(likely[1:])
+        self._least, self._most = 1, MAX_OBJECT_DATA
+        self._told = False
+
+    def refused(self, abort_code: int) -> bool:
+        """The device refused ``size``. True where there is another one to try, which ``size`` is then."""
+        if abort_code not in _WRONG_SIZE:
+            return False
+        if abort_code == Abort.LENGTH_TOO_HIGH:
+            self._most, self._told = self.size - 1, True
+        elif abort_code == Abort.LENGTH_TOO_LOW:
+            self._least, self._told = self.size + 1, True
+        self._likely = [size for size in self._likely if self._least <= size <= self._most]
+        if self._likely:
+            self.size = self._likely.pop(0)
+            return True
+        self.size = (self._least + self._most) // 2
+        return self._told and self._least <= self._most
+
+
+class ModbusDevice:
+    """The device at ``peer``. ``tap`` gets every ADU."""
+
+    def __init__(
+        self, peer: ModbusPeer, bus: str, stamper: Stamper, tap: Callable[[Frame], None], commands: UrgentCommands
+    ) -> None:
+        self.peer = peer
+        self.state = LinkState.CLOSED
+        self.since_ns = stamper()
+        self.reason = ""
+        self.reconnects = 0
+        self.description: Description | None = None
+        self._bus = bus
+        self._stamper = stamper
+        self._tap = tap
+        self._commands = commands
+        self._link: ModbusLink | None = None
+        self._reopening: asyncio.Task[None] | None = None
+        self._changed = asyncio.Event()
+
+    # -- the connection ------------------------------------------------------------------
+
+    async def open(self, timeout_s: float) -> None:
+        """Connect; nothing where it is connected. Raises BusOpenError."""
+        if self.state is LinkState.CONNECTED:
+            return
+        link = ModbusLink(self.peer, self._bus, self._stamper, self._tap, self._on_lost)
+        await link.open(timeout_s)
+        self._link = link
+        self._turn(LinkState.CONNECTED, "")
+
+    async def close(self) -> None:
+        """End the connection for good; what runs ends with BusLostError."""
+        self._turn(LinkState.CLOSED, LinkState.CLOSED.value)
+        if self._reopening is not None:
+            self._reopening.cancel()
+            await asyncio.gather(self._reopening, return_exceptions=True)
+            self._reopening = None
+        if self._link is not None:
+            await self._link.close(self._not_connected())
+
+    async def renew(self) -> None:
+        """End the connection and open it again as soon as the device lets us."""
+        link = self.link
+        await link.close(BusLostError(bus=self._bus, reason="renewed"))
+        self._on_lost(BusLostError(bus=self._bus, reason="renewed"))
+
+    @property
+    def link(self) -> ModbusLink:
+        """The connection as it is now. Raises BusLostError where there is none."""
+        if self._link is None or self.state is not LinkState.CONNECTED:
+            raise self._not_connected()
+        return self._link
+
+    async def wait_for(self, state: LinkState, timeout_s: float | None = None) -> None:
+        """Wait until the connection is in ``state``. Raises TimeoutError."""
+        async with asyncio.timeout(timeout_s):
+            while self.state is not state:
+                self._changed.clear()
+                await self._changed.wait()
+
+    def _not_connected(self) -> BusLostError:
+        return BusLostError(bus=self._bus, node=self.peer.node, reason=self.reason or self.state.value)
+
+    def _turn(self, state: LinkState, reason: str) -> None:
+        self.state, self.reason, self.since_ns = state, reason, self._stamper()
+        self._changed.set()
+
+    def _on_lost(self, error: BusLostError | ProtocolError) -> None:
+        if self.state is LinkState.CONNECTED:
+            self._turn(LinkState.LOST, str(error.details["reason"]))
+            self._reopening = asyncio.get_running_loop().create_task(self._reopen())
+
+    async def _reopen(self) -> None:
+        attempt = 0
+        while self.state is LinkState.LOST:
+            await asyncio.sleep(_REOPEN_S[min(attempt, len(_REOPEN_S) - 1)])
+            attempt += 1
+            try:
+                await self.open(_REOPEN_S[-1])
+                self.reconnects += 1
+            except BusOpenError as error:
+                self.reason = str(error.details["reason"])
+                _LOG.debug("not open again: %s", error)
+
+    # -- objects ---------------------------------------------------------------------------
+
+    async def ask(self, request: Request, timeout_s: float, urgent: bool = False, what: str = "") -> Answer:
+        """Ask for what changes nothing: after it had to make room for an urgent request, again."""
+        while True:
+            try:
+                return await self.link.request(request, timeout_s, urgent, what)
+            except InterruptedRequest:
+                continue
+
+    async def read(self, address: Address, timeout_s: float | None = None, urgent: bool = False) -> bytes:
+        """One object. Raises SdoAbortError, ModbusExceptionError, NoAnswerError, BusLostError, ProtocolError.
+
+        The number of bytes has to be that of the object: where the device refuses the described one, it is looked for.
+        """
+        wait_s = self._timeout_s(address, timeout_s)
+        sizes = SizeSearch(self._sizes(address))
+        while True:
+            answer = await self.ask(ReadObject(address, sizes.size), wait_s, urgent, str(address))
+            if isinstance(answer, ObjectRead):
+                return answer.data
+            if not isinstance(answer, AbortAnswer) or not sizes.refused(answer.abort_code):
+                raise self.refusal(answer, str(address))
+
+    async def write(
+        self, address: Address, data: bytes, timeout_s: float | None = None,
+        verify: Verify = Verify.EQUAL, urgent: bool = False, known: int | None = None,
+    ) -> Written:  # fmt: skip
+        """Write once. See ``contract.Driver.write``."""
+        if len(data) > MAX_OBJECT_DATA:
+            reason = f"{len(data)} bytes do not fit one message ({MAX_OBJECT_DATA} do)"
+            raise RefusedError(device=self.peer.server, address=address.short, reason=reason)
+        link, wait_s = self.link, self._timeout_s(address, timeout_s)
+        if address.major in _SLOW:
+            wait_s = max(wait_s, SAVE_TIMEOUT_S)
+        async with link.turn(urgent):
+            self.require_known(address, known)
+            attempt = link.send(WriteObject(address, data), urgent)
+            answer = await self._end_of_write(link, attempt, address, wait_s)
+        if answer is None:
+            return await self._look_at(attempt, address, data, verify, urgent)
+        return await self._written(answer, address, urgent)
+
+    def require_known(self, address: Address, known: int | None) -> None:
+        """Raises OvertakenError where an urgent command came to the object that a write did not know of."""
+        if known is not None and self._commands.count(self.peer.node, address) != known:
+            raise OvertakenError(bus=self._bus, node=self.peer.node, address=address.short)
+
+    async def _end_of_write(self, link: ModbusLink, attempt: Attempt, address: Address, wait_s: float) -> Answer | None:
+        """The answer, None where there was none in time."""
+        try:
+            return await link.finish(attempt, wait_s, str(address))
+        except BusLostError as error:
+            reason = f"lost while writing, outcome unknown ({error.details['reason']})"
+            raise BusLostError(bus=self._bus, node=self.peer.node, address=str(address), reason=reason) from error
+        except (InterruptedRequest, NoAnswerError):
+            return None
+
+    async def _look_at(self, attempt: Attempt, address: Address, data: bytes, verify: Verify, urgent: bool) -> Written:
+        """A write had no answer in time. The device answers in order: what comes late comes before what is read."""
+        try:
+            found: bytes | None = await self.read(address, DEFAULT_TIMEOUT_S, urgent)
+        except DeviceError:
+            found = None
+        except (NoAnswerError, ProtocolError) as error:
+            error.details["outcome"] = "unknown"
+            raise
+        if attempt.late is not None:
+            return await self._written(attempt.late, address, urgent)
+        if verify is Verify.EQUAL and found == data:
+            return Written.READ_BACK
+        raise UnverifiedError(
+            node=self.peer.node,
+            address=str(address),
+            name=self.name(address),
+            sent=data.hex(),
+            found=None if found is None else found.hex(),
+            reason="outcome unknown" if found is None or verify is not Verify.EQUAL else "differs",
+        )
+
+    async def _written(self, answer: Answer, address: Address, urgent: bool) -> Written:
+        if isinstance(answer, AbortAnswer | ExceptionAnswer):
+            raise self.refusal(answer, str(address), None if urgent else await self._state_key())
+        return Written.ACKNOWLEDGED
+
+    async def _state_key(self) -> str | None:
+        """In what state the device refused a write: a text key; None where it does not say."""
+        try:
+            state = AxisState.of(int.from_bytes(await self.read(STATUSWORD), "little"))
+        except HubsideError:
+            return None
+        return None if state is None else f"axis_state.{_STATE_NAMES.get(state, state.name.lower())}"
+
+    # -- what is known of objects ------------------------------------------------------------
+
+    def refusal(self, answer: Answer, what: str, state_key: str | None = None) -> DeviceError:
+        """The error for a refusal; ``what`` is the object, or whatever was asked for."""
+        details = {"node": self.peer.node, "address": what, "name": self._name_of(what)}
+        if state_key is not None:
+            details["state_key"] = state_key
+        if isinstance(answer, AbortAnswer):
+            code = answer.abort_code
+            return SdoAbortError(**details, abort_code=code, text_key_reason=abort_text_key(code))
+        if isinstance(answer, ExceptionAnswer):
+            key = exception_text_key(answer.exception)
+            function, exception = answer.function, answer.exception
+            return ModbusExceptionError(**details, function=function, exception=exception, text_key_reason=key)
+        return DeviceError(**details, reason=type(answer).__name__)
+
+    def name(self, address: Address) -> str:
+        """The object's name, empty where it is not described."""
+        entry = None if self.description is None else self.description.entries.get(address)
+        return "" if entry is None else entry.title
+
+    def _name_of(self, what: str) -> str:
+        if self.description is None:
+            return ""
+        return next((entry.title for entry in self.description if str(entry.address) == what), "")
+
+    def _sizes(self, address: Address) -> tuple[int, ...]:
+        entry = None if self.description is None else self.description.entries.get(address)
+        if entry is None:
+            return _SIZES
+        size = entry.type.size or MAX_OBJECT_DATA
+        return (size, *(other for other in _SIZES if other != size))
+
+    def _timeout_s(self, address: Address, timeout_s: float | None) -> float:
+        if timeout_s is not None:
+            return timeout_s
+        entry = None if self.description is None else self.description.entries.get(address)
+        return DEFAULT_TIMEOUT_S if entry is None or entry.timeout_s is None else entry.timeout_s

@@ -1,0 +1,178 @@
+"""The whole dictionary by FC 101: how it ends, begins anew, makes room for STOP, and what it says of a device."""
+
+from __future__ import annotations
+
+import asyncio
+
+import pytest
+
+from app.drivers.contract import Written
+from app.drivers.modbus import BULK
+from app.drivers.modbus_backup import MAX_TIMEOUTS, read_dictionary
+from app.drivers.modbus_verify import Deviation, Finding, compare
+from app.errors import HubsideError, ModbusExceptionError, NoAnswerError, ProtocolError, SdoAbortError
+from app.model.address import Address
+from app.wire.modbus.adu import Message
+from app.wire.modbus.answers import AbortAnswer, Answer, ExceptionAnswer, FramesRead
+from app.wire.modbus.frames import ObjectFrame
+from app.wire.modbus.functions import Phase
+from app.wire.modbus.requests import ReadDictionary, ReadObject, WriteObject
+from app.wire.sdo import Abort
+from tests.drivers.modbus_rig import CONTROLWORD, POSITION, SAVE_TUNING, STOP, WINDOW, Bad, small
+from tests.drivers.modbus_server import PD4E, Dictionary, reply
+
+
+async def test_a_backup_has_every_object_and_holds_the_connection() -> None:
+    bad = Bad()
+    async with small(bad) as (driver, _):
+        backup, reading = asyncio.create_task(driver.backup(1)), asyncio.create_task(driver.read(1, WINDOW))
+        assert await backup == bad.dictionary.objects
+        await reading
+        assert [type(request) for request in bad.seen] == [ReadDictionary] * bad.count(ReadDictionary) + [ReadObject]
+        assert bad.seen[0] == ReadDictionary(Phase.START)
+        assert all(request == ReadDictionary(Phase.CONTINUE) for request in bad.seen[1:-1])
+
+
+class Ending(Bad):
+    """Answers the third message of FC 101 with ``end``; what comes after that is "no data available"."""
+
+    def __init__(self, end: Answer | None) -> None:
+        super().__init__()
+        self.end = end
+
+    async def instead(self, message: Message, request: object) -> bytes | None:
+        if not isinstance(request, ReadDictionary) or self.count(ReadDictionary) < 3 or self.end is None:
+            return b"" if self.end is None and self.count(ReadDictionary) == 3 else None
+        end = self.end if self.count(ReadDictionary) == 3 else AbortAnswer(Abort.NO_DATA)
+        return reply(message, end)
+
+
+FIRST = ObjectFrame(Address(0x1000), bytes(4))
+HIGH, HIGHER = ObjectFrame(Address(0xF000), b""), ObjectFrame(Address(0xF001), b"")
+
+
+@pytest.mark.parametrize(
+    ("end", "error"),
+    [
+        (AbortAnswer(Abort.DEVICE_STATE), SdoAbortError),
+        (AbortAnswer(0xFFFF1004), SdoAbortError),
+        (ExceptionAnswer(101, 4), ModbusExceptionError),
+        (FramesRead(Phase.CONTINUE, (FIRST,)), ProtocolError),
+        (FramesRead(Phase.CONTINUE, (HIGHER, HIGH)), ProtocolError),
+        (FramesRead(Phase.CONTINUE, (HIGH, HIGH)), ProtocolError),
+        (FramesRead(Phase.CONTINUE, ()), ProtocolError),
+        (FramesRead(Phase.START, (HIGH,)), ProtocolError),
+    ],
+)
+async def test_only_no_data_available_ends_a_backup(end: Answer, error: type[HubsideError]) -> None:
+    async with small(Ending(end)) as (driver, _):
+        with pytest.raises(error):
+            await driver.backup(1)
+
+
+async def test_a_backup_that_has_no_data_from_the_begin_fails() -> None:
+    class Empty(Bad):
+        async def instead(self, message: Message, request: object) -> bytes | None:
+            return reply(message, AbortAnswer(Abort.NO_DATA))
+
+    async with small(Empty()) as (driver, _):
+        with pytest.raises(SdoAbortError):
+            await driver.backup(1)
+
+
+async def test_a_backup_begins_anew_after_a_time_out() -> None:
+    ending = Ending(None)
+    async with small(ending) as (driver, _):
+        assert await read_dictionary(driver._device(1), timeout_s=1.0) == ending.dictionary.objects
+        starts = [number for number, request in enumerate(ending.seen) if request == ReadDictionary(Phase.START)]
+        assert starts == [0, 3]
+
+
+async def test_a_backup_of_a_device_that_falls_silent_fails() -> None:
+    class Dumb(Bad):
+        async def instead(self, message: Message, request: object) -> bytes | None:
+            return b""
+
+    dumb = Dumb()
+    async with small(dumb) as (driver, _):
+        with pytest.raises(NoAnswerError):
+            await read_dictionary(driver._device(1), timeout_s=0.02)
+        assert dumb.seen == [ReadDictionary(Phase.START)] * MAX_TIMEOUTS
+
+
+async def test_a_long_list_is_read_in_bulk_and_the_rest_one_by_one() -> None:
+    bad = Bad()
+    described = [entry.address for entry in PD4E if entry.access.readable]
+    wanted = [*described[: BULK - 1], Address(0x2FFF)]
+    async with small(bad) as (driver, _):
+        results = await driver.read_many(1, wanted)
+        assert list(results) == wanted
+        assert isinstance(results.pop(Address(0x2FFF)), SdoAbortError)
+        assert results == {address: bad.dictionary.objects[address] for address in wanted[:-1]}
+        assert bad.count(ReadDictionary) > 1
+        assert {each.address for each in bad.seen if isinstance(each, ReadObject)} == {Address(0x2FFF)}
+
+
+async def test_a_device_without_fc_101_is_read_one_by_one() -> None:
+    class Without(Bad):
+        async def instead(self, message: Message, request: object) -> bytes | None:
+            return reply(message, ExceptionAnswer(101, 1)) if isinstance(request, ReadDictionary) else None
+
+    bad = Without()
+    wanted = [entry.address for entry in PD4E if entry.access.readable][:BULK]
+    async with small(bad) as (driver, _):
+        assert await driver.read_many(1, wanted) == {address: bad.dictionary.objects[address] for address in wanted}
+
+
+async def test_a_backup_makes_room_for_a_stop_and_begins_anew() -> None:
+    stops: list[asyncio.Task[Written]] = []
+
+    class Stopping(Bad):
+        async def instead(self, message: Message, request: object) -> bytes | None:
+            if isinstance(request, ReadDictionary) and self.count(ReadDictionary) == 3:
+                stops.append(asyncio.create_task(driver.write(1, CONTROLWORD, STOP, urgent=True)))
+                await asyncio.sleep(0)
+            return None
+
+    stopping = Stopping()
+    async with small(stopping) as (driver, _):
+        found = await driver.backup(1)
+        assert await stops[0] is Written.ACKNOWLEDGED
+        assert found == stopping.dictionary.objects
+        kinds = [request for request in stopping.seen if isinstance(request, ReadDictionary | WriteObject)]
+        assert [type(request) for request in kinds[:5]] == [
+            ReadDictionary, ReadDictionary, ReadDictionary, WriteObject, ReadDictionary,
+        ]  # fmt: skip
+        assert kinds[4] == ReadDictionary(Phase.START)
+
+
+# -- what the device really has ------------------------------------------------------------
+
+
+async def test_a_device_as_described_has_no_deviation() -> None:
+    values = {command.address: 1 for command in (*PD4E.save, *PD4E.load)}
+    async with small(Bad(Dictionary(values=values))) as (driver, _):
+        assert [each for each in await driver.verify(1) if each.deviation is not Deviation.SUBS] == []
+
+
+def test_every_deviation_is_found() -> None:
+    as_described = Dictionary(values={c.address: 1 for c in (*PD4E.save, *PD4E.load)}).objects
+    before = set(compare(PD4E, as_described))
+    device = dict(as_described)
+    device[Address(0x1010, 0)] = b"\x02"
+    device[SAVE_TUNING] = bytes(4)
+    device[WINDOW] = b"\0\0"
+    device[Address(0x5000, 1)] = b"\7"
+    device[Address(0x0021, 1)] = b"\7\0"  # a data type
+    device[Address(0x3502, 1)] = (0x60400020).to_bytes(4, "little")
+    device[Address(0x3602, 2)] = (0x50000108).to_bytes(4, "little")
+    del device[POSITION]
+    assert set(compare(PD4E, device)) - before == {
+        Finding(Address(0x1010, 0), Deviation.SUBS, 13, 2),
+        Finding(SAVE_TUNING, Deviation.NOT_READY, 1, 0),
+        Finding(WINDOW, Deviation.SIZE, 4, 2),
+        Finding(Address(0x5000, 1), Deviation.EXTRA, None, 1),
+        Finding(POSITION, Deviation.MISSING, 4, None),
+        Finding(Address(0x3502, 1), Deviation.MAPPING, 16, 32),
+        Finding(Address(0x3602, 2), Deviation.MAPPING, None, 8),
+    }
