@@ -12,6 +12,7 @@ import { useMemo, useRef, useState } from "react";
 import type UPlot from "uplot";
 import {
   type Capture,
+  type CaptureLine,
   captureQuery,
   csvOfCapture,
   jsonOfCapture,
@@ -41,7 +42,7 @@ const VIEWS = ["time", "fft", "xy"] as const;
 
 interface Props {
   id: string;
-  captures: readonly Capture[];
+  captures: readonly CaptureLine[];
   armed: boolean;
 }
 
@@ -181,7 +182,12 @@ function Shown({ capture, captures, armed }: Omit<Props, "id"> & { capture: Capt
 }
 
 /** The signals of a capture in view, and of those that are laid over it. */
-function useTraces(head: CaptureHead, captures: readonly Capture[], view: Pair, isZoomed: boolean): Trace[] {
+function useTraces(
+  head: CaptureHead,
+  captures: readonly CaptureLine[],
+  view: Pair,
+  isZoomed: boolean,
+): Trace[] {
   const t = useTexts();
   const deviceName = useDeviceName();
   const [search] = usePageSearch();
@@ -196,7 +202,7 @@ function useTraces(head: CaptureHead, captures: readonly Capture[], view: Pair, 
     if (!values) return [];
     const own = tracesOf(head.signals, values, deviceName, t);
     const over = ids.flatMap((id, at) => {
-      const name = captures.find((one) => one.head.id === id)?.head.name ?? id;
+      const name = captures.find((one) => one.id === id)?.name ?? id;
       const series = laid[at];
       return series ? referenceTraces(own, series, name, at) : [];
     });

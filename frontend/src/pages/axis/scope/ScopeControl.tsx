@@ -95,6 +95,7 @@ function factsOf(line: ScopeLine, t: ReturnType<typeof useTexts>): string {
       : t(count === 1 ? "page.scope.state_captures_one" : "page.scope.state_captures", { count }),
     isArmed(line) ? t("page.scope.state_memory", { percent: Math.ceil(100 * line.filled) }) : "",
     line.unreadable === 0 ? "" : t("page.scope.state_unreadable", { count: line.unreadable }),
+    line.late === 0 ? "" : t("page.scope.state_late", { count: line.late }),
     line.person === "" ? "" : t("page.scope.state_by", { person: line.person }),
   ];
   return facts.filter((one) => one !== "").join(" · ");
