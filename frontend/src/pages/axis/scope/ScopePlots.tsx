@@ -13,7 +13,7 @@ import { useTexts } from "../../../texts/texts";
 import { PlotHead } from "./PlotHead";
 import classes from "./Scope.module.css";
 import { LEFT_PX, RIGHT_PX, ScopePlot } from "./ScopePlot";
-import { BITS, type PlotGroup } from "./traces";
+import { BITS, type PlotGroup, secondsText } from "./traces";
 import { moved, type Pair, within, zoomed } from "./view";
 
 const ZOOM_KEY = 0.5;
@@ -137,7 +137,7 @@ export function ScopePlots(props: Props) {
     >
       {groups.map((group, at) => (
         <Fragment key={group.key}>
-          <PlotHead {...{ group, hoverS, alone }} cursors={shown} />
+          <PlotHead {...{ group, alone }} hoverS={still ? hoverS : (hoverS ?? 0)} cursors={shown} />
           <ScopePlot
             group={group}
             view={view}
@@ -173,6 +173,11 @@ export function ScopePlots(props: Props) {
           ),
         )}
       </div>
+      {shown && (
+        <p className={`${classes.between} bench`} data-testid="between">
+          Δt <strong>{secondsText(shown[1] - shown[0], t)} s</strong>
+        </p>
+      )}
       <p className={classes.axis}>{t(still ? "page.scope.time_axis" : "page.scope.time_axis_live")}</p>
     </div>
   );
