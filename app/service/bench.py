@@ -143,6 +143,7 @@ class Bench:
         """Have ``connection``, which is open, as the one that is served."""
         connection.gate.blocks = self.restores.blocks
         self.connection = connection
+        self.scope.attach(connection)
         self.motion = MotionDesk(connection, self.journal, self._left)
         self.batteries = BatteryDesk(connection, self.motion, self.battery_archive)
         self.probes = Probes(connection)

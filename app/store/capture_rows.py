@@ -8,25 +8,24 @@ from app.store.schema import scope_captures
 
 
 def put_capture(
-    connection: Connection, capture_id: str, trigger_ns: int, head: str, values: bytes, in_force: str
+    connection: Connection, capture_id: str, trigger_ns: int, head: str, marks: str, values: bytes, in_force: str
 ) -> None:
-    """Add one. ``head`` and ``in_force`` are JSON, ``values`` packed (``service.scope.capture``)."""
-    connection.execute(
-        insert(scope_captures),
-        {"id": capture_id, "trigger_ns": trigger_ns, "head": head, "samples": values, "in_force": in_force},
-    )
+    """Add one. ``head``, ``marks`` and ``in_force`` are JSON, ``values`` packed (``service.scope.capture``)."""
+    row = {"id": capture_id, "trigger_ns": trigger_ns, "head": head, "marks": marks}
+    connection.execute(insert(scope_captures), {**row, "samples": values, "in_force": in_force})
 
 
 def heads(connection: Connection) -> list[str]:
-    """The heads of all, the latest first."""
+    """The heads of all without their marks, the latest first."""
     query = select(scope_captures.c.head).order_by(scope_captures.c.trigger_ns.desc(), scope_captures.c.id.desc())
     return list(connection.scalars(query))
 
 
-def head_of(connection: Connection, capture_id: str) -> str | None:
-    """The head of one, or None."""
-    found: str | None = connection.scalar(select(scope_captures.c.head).where(scope_captures.c.id == capture_id))
-    return found
+def head_of(connection: Connection, capture_id: str) -> tuple[str, str] | None:
+    """Head and marks of one, or None."""
+    query = select(scope_captures.c.head, scope_captures.c.marks).where(scope_captures.c.id == capture_id)
+    row = connection.execute(query).one_or_none()
+    return None if row is None else (row.head, row.marks)
 
 
 def values_of(connection: Connection, capture_id: str) -> bytes | None:

@@ -203,6 +203,10 @@ STEPS: Final[tuple[tuple[str, ...], ...]] = (
         ) STRICT""",
         "CREATE INDEX scope_captures_time ON scope_captures (trigger_ns)",
     ),
+    (
+        "ALTER TABLE scope_captures ADD COLUMN marks TEXT NOT NULL DEFAULT '[]'",
+        "UPDATE scope_captures SET marks = json_extract(head, '$.marks'), head = json_remove(head, '$.marks')",
+    ),
 )
 SCHEMA: Final = len(STEPS)
 """The version that this program writes."""

@@ -378,5 +378,6 @@ scope_captures = Table(
     Column("head", Text, nullable=False),
     Column("samples", LargeBinary, nullable=False),
     Column("in_force", Text, nullable=False),
+    Column("marks", Text, nullable=False),
 )
-"""``head`` and ``in_force`` are JSON, ``samples`` packed arrays (``service.scope.capture``)."""
+"""``head``, ``in_force`` and ``marks`` are JSON, ``samples`` packed arrays (``service.scope.capture``)."""

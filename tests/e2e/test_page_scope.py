@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import io
 import json
 import re
 from collections.abc import Iterator
 from pathlib import Path
+from urllib.parse import quote
 
+import numpy as np
 import pytest
+from PIL import Image
 from playwright.sync_api import BrowserContext, Download, Page, expect
 
 from tests.e2e.browser import SIZE
@@ -46,7 +50,7 @@ def setting(page: Page, total_s: str = "1", pre_s: str = "0.4") -> None:
 
 def arm(page: Page) -> None:
     page.get_by_test_id("arm").click()
-    expect(page.get_by_test_id("scope-state")).to_contain_text("Waiting for the trigger")
+    expect(page.get_by_test_id("scope-state")).to_contain_text("Waiting for the trigger", timeout=WAIT_MS)
     expect(page.get_by_test_id("scope-live")).to_be_visible(timeout=WAIT_MS)
 
 
@@ -64,6 +68,18 @@ def by_hand(page: Page) -> str:
     page.wait_for_timeout(600)  # so that there is something before the trigger
     page.get_by_test_id("trigger-now").click()
     return captured(page)
+
+
+def zoom_of(url: str) -> tuple[float, float]:
+    """The stretch in view, s."""
+    found = re.search(r"zoom=(-?[\d.]+?)\.\.(-?[\d.]+)", url)
+    assert found is not None
+    return float(found[1]), float(found[2])
+
+
+def span(url: str) -> float:
+    begin_s, end_s = zoom_of(url)
+    return end_s - begin_s
 
 
 def bytes_of(download: Download) -> bytes:
@@ -93,6 +109,18 @@ def test_a_capture_from_the_signals_to_the_files(scope: Page) -> None:
     expect(row.get_by_test_id("at-a")).to_have_text(re.compile(r"^\d+\.\d\d °$"))
     expect(row.get_by_test_id("delta")).to_have_text(re.compile(r"^−?\d\.\d\d °$"))
 
+    head = page.get_by_test_id("scope-plots").get_by_text("position actual value").first
+    expect(head).to_have_text(re.compile(r"A \d+\.\d\d B \d+\.\d\d Δ −?\d\.\d\d$"))
+    expect(page.get_by_test_id("between")).to_contain_text("0.5000 s")
+
+    # an axis for each signal, and back
+    plots = page.locator("[data-plot]")
+    expect(plots).to_have_count(5)
+    page.get_by_test_id("axes-each").click()
+    expect(plots).to_have_count(6)
+    page.get_by_test_id("axes-each").click()
+    expect(plots).to_have_count(5)
+
     # zoom by dragging, by keyboard, and back
     box = page.get_by_test_id("scope-plots").bounding_box()
     assert box is not None
@@ -103,6 +131,14 @@ def test_a_capture_from_the_signals_to_the_files(scope: Page) -> None:
     expect(page).to_have_url(re.compile(r"zoom=-?0"))
     page.get_by_test_id("scope-plots").press("+")
     narrow = page.url
+    page.keyboard.down("Shift")
+    page.mouse.move(box["x"] + 0.6 * box["width"], box["y"] + 60)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 60, steps=3)
+    page.mouse.up()
+    page.keyboard.up("Shift")
+    assert zoom_of(page.url)[0] > zoom_of(narrow)[0], "moved to what comes later"
+    assert span(page.url) == pytest.approx(span(narrow), abs=1e-4)
     page.get_by_test_id("scope-plots").press("0")
     expect(page).not_to_have_url(re.compile("zoom="))
     assert narrow != page.url
@@ -124,9 +160,12 @@ def test_a_capture_from_the_signals_to_the_files(scope: Page) -> None:
     assert len(whole["in_force"]) > 100
     with page.expect_download() as picture:
         page.get_by_test_id("scope-png").click()
-    data = bytes_of(picture.value)
-    assert data.startswith(PNG)
-    assert int.from_bytes(data[16:20], "big") > 600, "as wide as the plots"
+    assert_shows(bytes_of(picture.value), page, "dark")
+    page.goto(with_theme(page.url, "light"))
+    expect(page.get_by_test_id("scope-plot-bits")).to_be_visible()
+    with page.expect_download() as light:
+        page.get_by_test_id("scope-png").click()
+    assert_shows(bytes_of(light.value), page, "light")
 
     # parameters in force
     page.get_by_test_id("in-force").click()
@@ -147,6 +186,96 @@ def test_a_capture_from_the_signals_to_the_files(scope: Page) -> None:
     page.get_by_test_id("scope-side-captures").click()
     page.get_by_label("Lay capture first one over as a reference").check()
     expect(page.get_by_test_id(f"reference-{POSITION}")).to_contain_text("dashed: first one")
+
+
+def with_theme(url: str, theme: str) -> str:
+    return re.sub(r"[?&]theme=\w+", "", url) + f"&theme={theme}"
+
+
+def rgb(colour: str) -> tuple[int, int, int]:
+    """Of ``#rrggbb``."""
+    return int(colour[1:3], 16), int(colour[3:5], 16), int(colour[5:7], 16)
+
+
+def assert_shows(data: bytes, page: Page, theme: str) -> None:
+    """The picture has the plots, each trace in its colour, a line of the legend for each, and text above."""
+    assert data.startswith(PNG)
+    picture = np.asarray(Image.open(io.BytesIO(data)).convert("RGB")).astype(np.int16)
+    height, width, _ = picture.shape
+    plots = page.get_by_test_id("scope-plots").bounding_box()
+    assert plots is not None
+    assert width == pytest.approx(plots["width"] + 2 * 16, abs=4), "as wide as the plots, with a margin"
+    colours: list[str] = page.evaluate(
+        """() => { const style = getComputedStyle(document.querySelector('[data-testid=scope-plots]'));
+        return ['--hs-panel', ...Array.from({length: 6}, (_, at) => `--scope-${at}`)].map(
+            (name) => style.getPropertyValue(name).trim()); }"""
+    )
+    ground, traces = rgb(colours[0]), [rgb(one) for one in colours[1:]]
+    assert (sum(ground) > 3 * 200) is (theme == "light")
+    assert tuple(picture[2, 2]) == ground, "the ground is that of the page"
+    legend_px = 18
+    legend = picture[-(6 * legend_px + 30) :, 16:38]
+    for colour in traces:
+        of_colour = (np.abs(picture - np.array(colour)).max(axis=2) <= 12)[:, 60:]
+        assert (of_colour[: height - 6 * legend_px - 30].sum(axis=0) > 0).mean() > 0.5, "over most of the time axis"
+        assert (np.abs(legend - np.array(colour)).max(axis=2) <= 12).sum() > 20, "and in the legend"
+    for name, (top, bottom) in {"title": (12, 36), "about": (36, 56), "legend": (height - 120, height - 20)}.items():
+        inked = np.abs(picture[top:bottom, 46:400] - np.array(ground)).max(axis=2) > 90
+        assert inked.sum() > 150, name
+
+
+def test_a_link_opens_the_same_setup(context: BrowserContext, scope: Page) -> None:
+    page = scope
+    page.get_by_test_id("preset-following").click()
+    setting(page, "4", "1.5")
+    choose(page, "trigger-kind", "Edge")
+    expect(page.get_by_test_id("trigger-signal")).to_have_value("Blade 1 PMC following error actual value")
+    choose(page, "trigger-signal", "Blade 1 PMC position actual value")
+    page.get_by_test_id("scope-level").fill("45.5")
+    page.get_by_text("falling", exact=True).click()
+    page.get_by_text("Normal", exact=True).click()
+    page.get_by_test_id("scope-hold-off").fill("0.5")
+    told = "edge;signal:blade-1/pmc/6064;level:45.5;total:4;pre:1.5;holdoff:0.5;slope:falling;mode:normal"
+    expect(page).to_have_url(re.compile(f"trigger={re.escape(quote(told, safe='/:'))}"))
+
+    def same(shown: Page) -> None:
+        expect(shown.get_by_test_id("chosen-signals").get_by_role("listitem")).to_have_count(4)
+        shown.get_by_test_id("scope-side-trigger").click()
+        expect(shown.get_by_test_id("trigger-kind")).to_have_value("Edge")
+        expect(shown.get_by_test_id("trigger-signal")).to_have_value("Blade 1 PMC position actual value")
+        for name, value in (("level", "45.5"), ("total", "4"), ("pre", "1.5"), ("hold-off", "0.5")):
+            expect(shown.get_by_test_id(f"scope-{name}")).to_have_value(value)
+        for name in ("falling", "Normal"):
+            expect(shown.get_by_role("radio", name=name)).to_be_checked()
+
+    same(page)
+    page.reload()
+    same(page)
+    other = context.new_page()
+    other.goto(page.url)
+    same(other)
+    # what a colleague arms meanwhile does not change what this link says
+    other.get_by_test_id("scope-total").fill("2")
+    other.get_by_test_id("arm").click()
+    expect(other.get_by_test_id("scope-state")).to_contain_text("Armed")
+    expect(other).to_have_url(re.compile("total:2"))
+    expect(page.get_by_test_id("scope-state")).to_contain_text("Armed")
+    same(page)
+    other.close()
+
+
+def test_before_the_first_capture_the_page_says_what_is_missing(scope: Page) -> None:
+    page = scope
+    page.goto(re.sub(r"[&?](channels|trigger)=[^&]*", "", page.url) + "&channels=none")
+    expect(page.get_by_test_id("scope-start")).to_contain_text("Nothing is chosen yet")
+    page.get_by_test_id("preset-motion").click()
+    expect(page.get_by_test_id("scope-start")).to_contain_text("Chosen, 6 of 16")
+    page.get_by_test_id("step-trigger").click()
+    choose(page, "trigger-kind", "Level")
+    page.get_by_test_id("scope-level").fill("12.5")
+    expect(page.get_by_test_id("scope-start")).to_contain_text(
+        "Level, Blade 1 PMC position actual value, above, 12.5 °. 5 s, of which 1 s before the trigger."
+    )
 
 
 def test_a_moving_axis_triggers_and_its_capture_shows_the_motion(

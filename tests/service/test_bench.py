@@ -19,6 +19,7 @@ from app.service.bench import Bench
 from app.service.journal import Kind
 from app.service.link import bench_line
 from app.service.options import Options
+from app.service.scope.order import ScopeOrder, TriggerOrder
 from app.service.sites import Sites
 from tests.e2e.conftest import site_for
 from tests.service.conftest import Served
@@ -92,6 +93,30 @@ async def test_another_turbine_ends_the_connection_that_there_is(bench: Bench) -
     assert bench.connection is None, "a bench that could not connect serves nothing, and does not show the one before"
     await bench.connect("wtg-07", "anna")
     await heard_of(bench)
+
+
+async def test_no_scope_stays_armed_for_a_connection_that_ends(bench: Bench) -> None:
+    """Somebody arms again and again while the connection ends: each is refused, or ended with the connection."""
+    connection = await bench.connect("wtg-07", "anna")
+    await heard_of(bench)
+    by_hand = TriggerOrder("manual", None, None, None, None, None, None, None)
+    order = ScopeOrder(("wtg-07/blade-1/pmc/6064",), by_hand, 1.0, 0.5, "single", 0.0, 1.0)
+    await bench.scope.arm(connection, order, "bert")
+    ending = asyncio.create_task(bench.disconnect("anna"))
+    refused = 0
+    while not ending.done():
+        try:
+            await bench.scope.arm(connection, order, "bert")
+        except NotConnectedError:
+            refused += 1
+        await asyncio.sleep(0)
+    await ending
+    assert refused > 0
+    assert bench.scope.run is not None
+    assert bench.scope.run.over
+    assert all(link.listeners == () for link in connection.buses.values())
+    again = await bench.connect("wtg-07", "anna")
+    assert (await bench.scope.arm(again, order, "bert")).connection is again
 
 
 async def test_an_unknown_turbine_leaves_the_connection_alone(bench: Bench) -> None:

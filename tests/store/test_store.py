@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import signal
 import sqlite3
 import subprocess
@@ -19,7 +20,7 @@ from sqlalchemy import Connection, text
 from app.errors import StoreBusyError, StoreDamagedError, StoreError, StoreInUseError
 from app.model.roles import Role
 from app.service.office.audit import Action, AuditLog
-from app.store import database, user_rows
+from app.store import capture_rows, database, user_rows
 from app.store.migrations import SCHEMA, STEPS
 from app.store.schema import metadata
 from app.store.store import Store
@@ -81,6 +82,21 @@ def test_every_earlier_version_is_brought_up_to_date_with_its_rows(tmp_path: Pat
         with closing(sqlite3.connect(kept)) as file:
             assert file.execute("PRAGMA user_version").fetchone() == (version,)
             assert file.execute("SELECT name FROM users").fetchall() == [("Anna",)]
+
+
+def test_marks_of_captures_get_a_column_of_their_own(tmp_path: Path) -> None:
+    """A list of captures reads their heads, and there may be thousands of marks in one."""
+    adding = next(n for n, step in enumerate(STEPS) if any("ADD COLUMN marks" in one for one in step))
+    path = at_version(tmp_path / "old", adding)
+    mark = {"t_ns": 7, "what": "gap", "bus": "can0", "device": None, "detail": "Lücke"}
+    head = {"id": "1", "marks": [mark], "signals": [{"name": "a/b/c/6064"}]}
+    with closing(sqlite3.connect(path)) as file:
+        file.execute("INSERT INTO scope_captures VALUES ('1', 7, ?, x'00', '[]')", (json.dumps(head),))
+        file.commit()
+    with opened(tmp_path / "old") as store:
+        found = store.call(lambda kept: capture_rows.head_of(kept, "1"))
+    assert found is not None
+    assert [json.loads(text) for text in found] == [{"id": "1", "signals": [{"name": "a/b/c/6064"}]}, [mark]]
 
 
 def test_the_tables_are_those_that_the_queries_know(tmp_path: Path) -> None:

@@ -3,14 +3,22 @@
 from __future__ import annotations
 
 import asyncio
+import threading
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from itertools import pairwise
 from typing import Any
 
 import pytest
+from fastapi import Request, Response
+from fastapi.responses import StreamingResponse
 
 from app.model.address import Address
 from app.service.connection import Connection
+from app.service.scope import captures as captures_module
+from app.service.scope.capture import CaptureLine, load_line
+from app.web.routes.scope import capture_csv, capture_json
+from tests.service.scope.test_analysis import capture
 from tests.web.rig import DEADLINE_S, Server, running
 
 AXIS = "wtg-07/blade-1/pmc"
@@ -41,8 +49,9 @@ async def captured(server: Server) -> dict[str, Any]:
     async with asyncio.timeout(DEADLINE_S):
         while not (found := (await server.client.get("/api/scope/captures")).json()):  # noqa: ASYNC110  no event
             await asyncio.sleep(0.02)
-    (one,) = found
-    document: dict[str, Any] = one
+    (line,) = found
+    assert (line["kept"], line["signals"], line["cause"]) == (True, 2, "trigger")
+    document: dict[str, Any] = (await server.client.get(f"/api/scope/captures/{line['id']}")).json()
     return document
 
 
@@ -76,6 +85,62 @@ async def test_a_capture_is_made_read_named_taken_out_and_deleted() -> None:
         assert (await client.delete(path)).status_code == 200
         gone = await client.get(f"{path}/series")
         assert (gone.status_code, gone.json()["code"]) == (404, "scope_unknown")
+
+
+async def turns_of(server: Server, response: Response) -> list[int]:
+    """How often another coroutine had had its turn when each piece of an answer came."""
+    count = 0
+
+    async def others() -> None:
+        nonlocal count
+        while True:
+            count += 1
+            await asyncio.sleep(0)
+
+    beside = asyncio.create_task(others())
+    assert isinstance(response, StreamingResponse)
+    seen = [count async for _piece in response.body_iterator]
+    beside.cancel()
+    return seen
+
+
+async def test_the_loop_goes_on_while_a_large_capture_is_taken_out() -> None:
+    """The stop of an axis must not wait for a file: between any two pieces of it others have their turn."""
+    async with serving() as server:
+        kept = server.bench.office.captures
+        one = capture([(n / 1000, n) for n in range(30_000)], [(n / 1000, -n) for n in range(30_000)])
+        head = await kept.keep(one, [])
+        csv = await capture_csv(Request({"type": "http"}), kept, head.id, "en")
+        for response, least in ((csv, 30), (await capture_json(kept, head.id), 90)):
+            seen = await turns_of(server, response)
+            assert len(seen) > least
+            assert all(before < after for before, after in pairwise(seen))
+        path = f"/api/scope/captures/{head.id}"
+        text = (await server.client.get(f"{path}/csv")).text
+        assert len(text.splitlines()) == 30_001
+        whole = (await server.client.get(f"{path}/json")).json()
+        assert [one["raw"][-1] for one in whole["signals"]] == [29_999, -29_999]
+
+
+async def test_the_list_is_read_beside_the_loop_and_only_where_it_changed(monkeypatch: pytest.MonkeyPatch) -> None:
+    readers: list[bool] = []
+
+    def noting(text: str) -> CaptureLine:
+        readers.append(threading.current_thread() is threading.main_thread())
+        return load_line(text)
+
+    monkeypatch.setattr(captures_module, "load_line", noting)
+    async with serving() as server:
+        one = await captured(server)
+        (line,) = (await server.client.get("/api/scope/captures")).json()
+        assert "marks" not in line
+        assert readers == [False]
+        path = f"/api/scope/captures/{one['head']['id']}"
+        await server.client.patch(path, json={"name": "again", "note": ""})
+        (line,) = (await server.client.get("/api/scope/captures")).json()
+        assert (line["name"], readers) == ("again", [False, False])
+        await server.client.delete(path)
+        assert (await server.client.get("/api/scope/captures")).json() == []
 
 
 async def test_parameters_that_differ_now_are_told() -> None:

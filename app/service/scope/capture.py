@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
 from decimal import Decimal
 from typing import Any
 
@@ -111,6 +111,23 @@ class Head:
 
 
 @dataclass(frozen=True, slots=True)
+class CaptureLine:
+    """A capture in the list of all. Not ``kept``: it goes with the next one, or with the server."""
+
+    id: str
+    name: str
+    note: str
+    person: str
+    turbine: str
+    turbine_name: str
+    cause: str
+    ended: str
+    trigger_ns: int
+    signals: int
+    kept: bool
+
+
+@dataclass(frozen=True, slots=True)
 class Values:
     """The values of one signal by time, raw."""
 
@@ -163,12 +180,32 @@ def unpack_values(packed: bytes) -> tuple[Values, ...]:
 
 
 def dump_head(head: Head) -> str:
-    """The head as JSON."""
-    return json.dumps(asdict(head), ensure_ascii=False, separators=(",", ":"))
+    """The head as JSON, without its marks: of those there may be thousands, and a list of captures shows none."""
+    plain = asdict(replace(head, marks=()))
+    del plain["marks"]
+    return json.dumps(plain, ensure_ascii=False, separators=(",", ":"))
 
 
-def load_head(text: str) -> Head:
-    """What ``dump_head`` gave."""
+def dump_marks(head: Head) -> str:
+    """The marks as JSON."""
+    return json.dumps([asdict(one) for one in head.marks], ensure_ascii=False, separators=(",", ":"))
+
+
+def load_line(text: str) -> CaptureLine:
+    """The line in the list of what ``dump_head`` gave."""
+    plain = json.loads(text)
+    named = {one.name: plain[one.name] for one in fields(CaptureLine) if one.name not in ("signals", "kept")}
+    return CaptureLine(**named, signals=len(plain["signals"]), kept=True)
+
+
+def line_of(head: Head, kept: bool) -> CaptureLine:
+    """The line of a capture in the list."""
+    named = {one.name: getattr(head, one.name) for one in fields(CaptureLine) if one.name not in ("signals", "kept")}
+    return CaptureLine(**named, signals=len(head.signals), kept=kept)
+
+
+def load_head(text: str, marks: str) -> Head:
+    """What ``dump_head`` and ``dump_marks`` gave."""
     plain = json.loads(text)
     order = plain["order"]
     asked = ScopeOrder(
@@ -179,7 +216,7 @@ def load_head(text: str) -> Head:
             **plain,
             "order": asked,
             "signals": tuple(KeptSignal(**one) for one in plain["signals"]),
-            "marks": tuple(KeptMark(**one) for one in plain["marks"]),
+            "marks": tuple(KeptMark(**one) for one in json.loads(marks)),
             "devices": tuple(KeptDevice(**one) for one in plain["devices"]),
         }
     )

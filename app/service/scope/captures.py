@@ -13,13 +13,17 @@ from app.errors import ScopeCaptureError, ScopeUnknownError
 from app.service.office.audit import Action, AuditLog
 from app.service.scope.capture import (
     Capture,
+    CaptureLine,
     Head,
     InForce,
     Values,
     dump_head,
     dump_in_force,
+    dump_marks,
+    line_of,
     load_head,
     load_in_force,
+    load_line,
     pack_values,
     renamed,
     unpack_values,
@@ -32,10 +36,27 @@ MAX_KEPT: Final = 2000
 
 @dataclass(frozen=True, slots=True)
 class Listed:
-    """A capture in the list. Not ``kept``: it goes with the next one, or with the server."""
+    """A capture without its values. Not ``kept``: it goes with the next one, or with the server."""
 
     head: Head
     kept: bool
+
+
+@dataclass(frozen=True, slots=True)
+class _Packed:
+    """A capture as the store keeps it."""
+
+    head: Head
+    text: str
+    marks: str
+    values: bytes
+    in_force: str
+
+
+def _packed(capture: Capture, rows: Sequence[InForce]) -> _Packed:
+    values, in_force = pack_values(capture.values), dump_in_force(rows)
+    head = replace(capture.head, size_bytes=len(values) + len(in_force.encode()))
+    return _Packed(head, dump_head(head), dump_marks(head), values, in_force)
 
 
 class Captures:
@@ -47,23 +68,32 @@ class Captures:
         self._loose: tuple[Capture, tuple[InForce, ...]] | None = None
         self._open: tuple[str, tuple[Values, ...]] | None = None
         """The values that were asked for last: a page asks for them again with every zoom."""
+        self._lines: list[CaptureLine] | None = None
+        """What is kept, as it is listed; None: not known. Every open page asks for it again and again."""
+        self._version = 0
 
     # -- reading -------------------------------------------------------------------
 
-    async def all(self) -> list[Listed]:
+    async def all(self) -> list[CaptureLine]:
         """All, the latest first."""
-        kept = [Listed(load_head(text), True) for text in await self._store.run(capture_rows.heads)]
-        loose = [] if self._loose is None else [Listed(self._loose[0].head, False)]
-        return sorted((*loose, *kept), key=lambda one: one.head.trigger_ns, reverse=True)
+        kept = self._lines
+        if kept is None:
+            version = self._version
+            texts = await self._store.run(capture_rows.heads)
+            kept = await asyncio.to_thread(lambda: [load_line(text) for text in texts])
+            if version == self._version:
+                self._lines = kept
+        loose = [] if self._loose is None else [line_of(self._loose[0].head, False)]
+        return sorted((*loose, *kept), key=lambda one: one.trigger_ns, reverse=True)
 
     async def head(self, capture_id: str) -> Listed:
         """One without its values. Raises ScopeUnknownError."""
         if (loose := self._of_loose(capture_id)) is not None:
             return Listed(loose[0].head, False)
-        text = await self._store.run(lambda kept: capture_rows.head_of(kept, capture_id))
-        if text is None:
+        texts = await self._store.run(lambda kept: capture_rows.head_of(kept, capture_id))
+        if texts is None:
             raise ScopeUnknownError(capture=capture_id)
-        return Listed(load_head(text), True)
+        return Listed(await asyncio.to_thread(load_head, *texts), True)
 
     async def get(self, capture_id: str) -> Capture:
         """One whole. Raises ScopeUnknownError, ScopeCaptureError."""
@@ -101,14 +131,16 @@ class Captures:
         """Keep one for good. Raises ScopeCaptureError where there are too many."""
         if await self._store.run(capture_rows.count) >= MAX_KEPT:
             raise ScopeCaptureError(capture=capture.head.name, reason=f"{MAX_KEPT} captures are kept already")
-        packed, in_force = await asyncio.to_thread(lambda: (pack_values(capture.values), dump_in_force(rows)))
-        head = replace(capture.head, size_bytes=len(packed) + len(in_force.encode()))
-        text = dump_head(head)
+        packed = await asyncio.to_thread(_packed, capture, rows)
+        head = packed.head
 
         def put(kept: Connection) -> None:
-            capture_rows.put_capture(kept, head.id, head.trigger_ns, text, packed, in_force)
+            capture_rows.put_capture(
+                kept, head.id, head.trigger_ns, packed.text, packed.marks, packed.values, packed.in_force
+            )
 
         await self._store.run(put)
+        self._changed()
         return head
 
     async def change(self, capture_id: str, name: str, note: str, person: str) -> Head:
@@ -119,8 +151,10 @@ class Captures:
             self._loose = None
         else:
             head = renamed((await self.head(capture_id)).head, name, note)
-            if not await self._store.run(lambda kept: capture_rows.put_head(kept, capture_id, dump_head(head))):
+            text = dump_head(head)
+            if not await self._store.run(lambda kept: capture_rows.put_head(kept, capture_id, text)):
                 raise ScopeUnknownError(capture=capture_id)
+            self._changed()
         self._audit.note(Action.CAPTURE_CHANGED, person, capture=name)
         return head
 
@@ -132,7 +166,13 @@ class Captures:
             return
         head = (await self.head(capture_id)).head
         await self._store.run(lambda kept: capture_rows.delete_capture(kept, capture_id))
+        self._changed()
         self._audit.note(Action.CAPTURE_DELETED, person, capture=head.name)
+
+    def _changed(self) -> None:
+        """The list is another."""
+        self._version += 1
+        self._lines = None
 
     def _of_loose(self, capture_id: str) -> tuple[Capture, tuple[InForce, ...]] | None:
         return self._loose if self._loose is not None and self._loose[0].head.id == capture_id else None

@@ -8,18 +8,18 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final
 
-from app.errors import HubsideError, ScopeStateError
+from app.errors import HubsideError, NotConnectedError, ScopeStateError
 from app.model.address import Address
 from app.model.sets import iso_time
 from app.service.connection import Connection
 from app.service.journal import Journal, Kind
 from app.service.polling import PollPlan
-from app.service.scope.capture import Capture, Head, KeptMark, KeptSignal, Values
+from app.service.scope.capture import Capture, Head, InForce, KeptDevice, KeptMark, KeptSignal, Values
 from app.service.scope.captures import Captures
-from app.service.scope.engine import Caught, Cause, Ended, Engine, Mark, Phase
+from app.service.scope.engine import SETTLE_NS, Caught, Cause, Ended, Engine, Mark, Phase
 from app.service.scope.in_force import Frozen, in_force, who
 from app.service.scope.order import Plan, ScopeOrder, plan
 from app.service.scope.sampling import Sampling
@@ -36,6 +36,8 @@ SHOWN_NS: Final = 10_000_000_000
 """The live view spans so much."""
 MAX_CAPTURES: Final = 100
 """Of one arming: then it stops."""
+ARRIVAL_S: Final = 0.005
+"""How often is looked whether all has come that crossed the wire until now."""
 _PDOS: Final = (Source.PDO_TX, Source.PDO_RX)
 
 
@@ -79,6 +81,7 @@ class ScopeDesk:
         twins: Callable[[], bool],
     ) -> None:
         self.captures = captures
+        self._attached: Connection | None = None
         self.run: Run | None = None
         self.now_ns = stamper
         self._journal = journal
@@ -91,9 +94,14 @@ class ScopeDesk:
     # -- orders ------------------------------------------------------------------------
 
     async def arm(self, connection: Connection, order: ScopeOrder, person: str) -> Run:
-        """Begin; what was armed before ends. Raises ScopeSettingsError; then nothing has changed."""
+        """Begin; what was armed before ends. Raises ScopeSettingsError; then nothing has changed.
+
+        NotConnectedError: ``connection`` is not the one that is served any more.
+        """
         planned = plan(order, connection.target, connection.targets)
         async with self._changing:
+            if connection is not self._attached:
+                raise NotConnectedError
             await self._end(Ended.STOPPED)
             run = self._made(connection, order, planned, person)
             self.run = run
@@ -106,7 +114,8 @@ class ScopeDesk:
 
     def _made(self, connection: Connection, order: ScopeOrder, planned: Plan, person: str) -> Run:
         armed_ns = self.now_ns()
-        engine = Engine(planned.channels, planned.trigger, planned.timing, armed_ns, SHOWN_NS)
+        buses = [place.bus for place in planned.sources]
+        engine = Engine(planned.channels, planned.trigger, planned.timing, armed_ns, buses, SHOWN_NS)
         run: Run
 
         def take(heard: Sequence[Heard]) -> None:
@@ -128,9 +137,14 @@ class ScopeDesk:
         async with self._changing:
             await self._end(Ended.STOPPED)
 
+    def attach(self, connection: Connection) -> None:
+        """From now on ``connection`` is served: for it alone the scope can be armed."""
+        self._attached = connection
+
     async def detach(self) -> None:
-        """The connection ends."""
+        """The connection ends; who arms for it from now on is refused."""
         async with self._changing:
+            self._attached = None
             run = self.run
             if run is not None and not run.over:
                 run.reason_key = "scope.over.link"
@@ -177,9 +191,12 @@ class ScopeDesk:
 
     async def _tick_forever(self, run: Run) -> None:
         while not run.over:
-            self._keep_all(run, run.engine.advance(self.now_ns()))
+            self._keep_all(run, run.engine.advance(run.tap.settled_ns(self.now_ns(), SETTLE_NS)))
             self._freeze(run)  # a capture of AUTO may have begun
-            if len(run.made) >= MAX_CAPTURES:
+            if run.tap.failed:
+                await run.tap.drain()
+                self._break_off(run)
+            elif len(run.made) >= MAX_CAPTURES:
                 run.reason_key = "scope.over.full"
                 self._release(run)
             elif run.engine.phase is Phase.DONE:
@@ -191,8 +208,12 @@ class ScopeDesk:
         if run is None:
             return
         if not run.over:
-            self._keep_all(run, run.engine.stop(self.now_ns(), why))
-            self._release(run)
+            stop_ns = self.now_ns()
+            if run.engine.window is not None:
+                await self._let_in(run, stop_ns)
+            if not run.over:  # it may have come to its end meanwhile
+                self._keep_all(run, run.engine.stop(stop_ns, why))
+                self._release(run)
         if run.ticker is not None:
             run.ticker.cancel()
             await asyncio.gather(run.ticker, return_exceptions=True)
@@ -200,12 +221,32 @@ class ScopeDesk:
             await run.sampling.close()
             run.sampling = None
 
+    async def _let_in(self, run: Run, until_ns: int) -> None:
+        """Take what crossed the wire until then and is still on its way through our threads."""
+        tap = run.tap
+        while tap.settled_ns(now_ns := self.now_ns(), 0) < until_ns and now_ns < until_ns + SETTLE_NS:  # noqa: ASYNC110  the receive thread has no event for it
+            await asyncio.sleep(ARRIVAL_S)
+        self._unlisten(run)
+        await tap.drain()
+
+    def _break_off(self, run: Run) -> None:
+        """A defect of ours ended the listening: what came is kept, and says from where on something is missing."""
+        now_ns = self.now_ns()
+        for bus in run.connection.buses:
+            run.engine.gap(run.tap.heard_ns.get(bus, now_ns) + 1, bus, "scope.gap.defect")
+        run.reason_key = "scope.over.defect"
+        self._keep_all(run, run.engine.stop(now_ns))
+        self._release(run)
+
+    def _unlisten(self, run: Run) -> None:
+        for link in run.connection.buses.values():
+            link.unlisten(run.tap.hear)
+
     def _release(self, run: Run) -> None:
         """Listen and read no more."""
         run.over = True
         run.tap.closed = True
-        for link in run.connection.buses.values():
-            link.unlisten(run.tap.hear)
+        self._unlisten(run)
         if run.sampling is not None:
             run.sampling.halt()
 
@@ -222,7 +263,8 @@ class ScopeDesk:
             task.add_done_callback(self._keeping.discard)
 
     async def _keep(self, run: Run, capture: Capture, frozen: Sequence[Frozen]) -> None:
-        rows = await asyncio.to_thread(in_force, frozen)
+        rows, devices = await asyncio.to_thread(_looked_up, frozen)
+        capture = replace(capture, head=replace(capture.head, devices=devices))
         if capture.head.cause == Cause.AUTO.value:
             self.captures.show(capture, rows)
             return
@@ -269,11 +311,15 @@ class ScopeDesk:
                 for one, stretch in zip(run.plan.signals, caught.stretches, strict=True)
             ),
             marks=tuple(_mark(one, slugs) for one in caught.marks),
-            devices=tuple(who(one) for one in seen.devices),
+            devices=(),
             recording=seen.recording,
             twin=self._twins(),
             size_bytes=0,
         )
+
+
+def _looked_up(frozen: Sequence[Frozen]) -> tuple[list[InForce], tuple[KeptDevice, ...]]:
+    return in_force(frozen), tuple(who(one) for one in frozen)
 
 
 def _happened(one: Heard) -> Happened:

@@ -14,7 +14,7 @@ from enum import Enum
 from typing import Final
 
 from app.service.scope.samples import Samples, Stretch
-from app.service.scope.trigger import Happened, Node, Trigger, What, bit_of, state_changed
+from app.service.scope.trigger import Happened, Node, Trigger, What, bit_of, forget_states, state_changed
 from app.wire.nmt import NmtState
 
 SETTLE_NS: Final = 150_000_000
@@ -137,12 +137,22 @@ class Engine:
         trigger: Trigger,
         timing: Timing,
         armed_ns: int,
+        buses: Sequence[str],
         shown_ns: int = 0,
         max_samples: int = MAX_SAMPLES,
     ) -> None:
-        """``shown_ns``: so much is remembered even where the pre-trigger is shorter, for who looks on."""
+        """``buses``: on which each source is, by its number.
+
+        ``shown_ns``: so much is remembered even where the pre-trigger is shorter, for who looks on.
+        """
         self.timing = timing
         self.triggered = 0
+        self.late = 0
+        """Values that came after the capture to which they belong was taken out: it does not have them."""
+        self._taken_ns = 0
+        self._on_bus: dict[str, list[int]] = {}
+        for source, bus in enumerate(buses):
+            self._on_bus.setdefault(bus, []).append(source)
         self._trigger = trigger
         self._memory = [Samples(one.code) for one in channels]
         self._of_source: dict[int, list[tuple[Samples, int | None]]] = {}
@@ -165,6 +175,8 @@ class Engine:
     def value(self, source: int, t_ns: int, raw: int | float, by_pdo: bool) -> None:
         """A value crossed the wire."""
         memories = self._of_source.get(source, ())
+        if t_ns <= self._taken_ns:
+            self.late += 1
         for samples, bit in memories:
             samples.add(t_ns, bit_of(raw, bit), by_pdo)
         self._held += len(memories)
@@ -183,13 +195,13 @@ class Engine:
             self._begin(event.t_ns, Cause.TRIGGER)
 
     def gap(self, t_ns: int, bus: str, reason_key: str) -> None:
-        """Something is missing before ``t_ns``."""
+        """Something of ``bus`` is missing at ``t_ns``: its lines are broken there, those of other buses go on."""
         self._marks.append(Mark(t_ns, "gap", bus, 0, reason_key))
-        self._trigger.forget()
-        self._states.clear()
+        self._trigger.forget(bus, self._on_bus.get(bus, ()))
+        forget_states(self._states, bus)
 
     def advance(self, now_ns: int) -> list[Caught]:
-        """Time has gone on; what is complete by now."""
+        """Time has gone on, and what crossed the wire until then was told; what is complete by now."""
         self._now_ns = max(now_ns, self._now_ns)
         done = [one for one in self._open if one.end_ns + SETTLE_NS <= now_ns]
         caught = [self._take(one) for one in done]
@@ -263,6 +275,7 @@ class Engine:
 
     def _take(self, window: Window) -> Caught:
         self._open.remove(window)
+        self._taken_ns = max(self._taken_ns, window.end_ns)
         span = window.start_ns, window.end_ns
         return Caught(window, tuple(one.between(*span) for one in self._memory), self.marks(*span))
 

@@ -9,7 +9,9 @@ from app.service.scope.capture import Values
 from app.service.scope.desk import SHOWN_NS, Run, ScopeDesk
 from app.service.scope.engine import Mark
 from app.service.scope.order import ScopeOrder
+from app.service.scope.samples import Stretch
 from app.service.scope.series import ScopeSeries, series_of
+from app.service.scope.signals import Signal
 
 RATE_NS: Final = 2_000_000_000
 """Rates are measured over so much."""
@@ -38,7 +40,8 @@ class ScopeLine:
     """The scope. ``available``: a turbine is connected. Times are t_ns.
 
     ``captures``: those of this arming, oldest first. ``reason_key``: why it ended by itself. ``filled``: share of its
-    memory, 0..1. ``unreadable``: values whose length is not their type's.
+    memory, 0..1. ``unreadable``: values whose length is not their type's. ``late``: values that came too late for the
+    capture to which they belong.
     """
 
     available: bool
@@ -54,6 +57,7 @@ class ScopeLine:
     reason_key: str | None
     filled: float
     unreadable: int
+    late: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +73,7 @@ def scope_line(desk: ScopeDesk, connected: bool) -> ScopeLine:
     """The scope now."""
     run, now_ns = desk.run, desk.now_ns()
     if run is None:
-        return ScopeLine(connected, "idle", None, "", None, None, None, now_ns, (), (), None, 0.0, 0)
+        return ScopeLine(connected, "idle", None, "", None, None, None, now_ns, (), (), None, 0.0, 0, 0)
     window = None if run.over else run.engine.window
     phase: PhaseName = "done" if run.over else _phase(run)
     return ScopeLine(
@@ -86,6 +90,7 @@ def scope_line(desk: ScopeDesk, connected: bool) -> ScopeLine:
         reason_key=run.reason_key,
         filled=round(run.engine.filled, 3),
         unreadable=run.unreadable,
+        late=run.engine.late,
     )
 
 
@@ -106,16 +111,31 @@ def _rates(run: Run, now_ns: int) -> tuple[SignalRate, ...]:
     return tuple(rates)
 
 
-def scope_view(desk: ScopeDesk, points: int) -> ScopeView:
-    """The live view: the last seconds of every signal."""
+@dataclass(frozen=True, slots=True)
+class Latest:
+    """What came last, as it was at ``now_ns``."""
+
+    now_ns: int
+    signals: tuple[Signal, ...]
+    stretches: list[Stretch]
+    marks: tuple[Mark, ...]
+
+
+def latest_of(desk: ScopeDesk) -> Latest:
+    """A copy of the last seconds of every signal: in the event loop, and quick."""
     run, now_ns = desk.run, desk.now_ns()
-    span_s = SHOWN_NS / 1e9
     if run is None or run.over:
-        return ScopeView(now_ns, span_s, [])
-    latest = run.engine.latest(now_ns - SHOWN_NS, now_ns)
-    marks = run.engine.marks(now_ns - SHOWN_NS, now_ns)
+        return Latest(now_ns, (), [], ())
+    since_ns = now_ns - SHOWN_NS
+    return Latest(now_ns, run.plan.signals, run.engine.latest(since_ns, now_ns), run.engine.marks(since_ns, now_ns))
+
+
+def scope_view(latest: Latest, points: int) -> ScopeView:
+    """The live view of it, in any thread."""
+    now_ns, marks = latest.now_ns, latest.marks
+    span_s = SHOWN_NS / 1e9
     series = []
-    for signal, stretch in zip(run.plan.signals, latest, strict=True):
+    for signal, stretch in zip(latest.signals, latest.stretches, strict=True):
         values = Values(stretch.t_ns, stretch.raw)
         breaks = sorted((one.t_ns - now_ns) / 1e9 for one in marks if _breaks(one, signal.place.bus, signal.place.node))
         scaled = values.scaled(str(signal.scale))

@@ -51,7 +51,7 @@ class Samples:
         last = bisect_right(self._t, to_ns, first)
         return Stretch(
             np.array(self._t[first:last], np.int64), np.array(self._raw[first:last], self._dtype),
-            sum(self._pdo[first:last]),
+            int(np.count_nonzero(np.array(self._pdo[first:last], np.uint8))),
         )  # fmt: skip
 
     def forget_before(self, t_ns: int) -> int:

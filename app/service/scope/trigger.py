@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from enum import Enum
 from typing import Final, Protocol
@@ -59,8 +60,8 @@ class Trigger(Protocol):
     def happened(self, event: Happened) -> bool:
         """An event came; True where it fulfils the condition."""
 
-    def forget(self) -> None:
-        """Something is missing here: what came before says nothing of what comes."""
+    def forget(self, bus: str, sources: Collection[int]) -> None:
+        """Something is missing of ``bus``, on which ``sources`` are: what came before says nothing of what comes."""
 
 
 class _Quiet:
@@ -74,7 +75,7 @@ class _Quiet:
         """No event does."""
         return False
 
-    def forget(self) -> None:
+    def forget(self, bus: str, sources: Collection[int]) -> None:
         """Nothing is known."""
 
 
@@ -100,9 +101,10 @@ class Edge(_Quiet):
         rose, fell = before < level <= now, before > level >= now
         return {Slope.RISING: rose, Slope.FALLING: fell, Slope.EITHER: rose or fell}[self._slope]
 
-    def forget(self) -> None:
+    def forget(self, bus: str, sources: Collection[int]) -> None:
         """The next value has none before it."""
-        self._before = None
+        if self._source in sources:
+            self._before = None
 
 
 class Level(_Quiet):
@@ -133,9 +135,10 @@ class Change(_Quiet):
         before, self._before = self._before, bit_of(raw, self._bit)
         return before is not None and before != self._before
 
-    def forget(self) -> None:
+    def forget(self, bus: str, sources: Collection[int]) -> None:
         """The next value has none before it."""
-        self._before = None
+        if self._source in sources:
+            self._before = None
 
 
 class StateChange(_Quiet):
@@ -154,9 +157,10 @@ class StateChange(_Quiet):
         before, self._before[source] = self._before.get(source), now
         return known and before is not now
 
-    def forget(self) -> None:
+    def forget(self, bus: str, sources: Collection[int]) -> None:
         """The next statusword has none before it."""
-        self._before.clear()
+        for source in sources:
+            self._before.pop(source, None)
 
 
 _FAULT: Final = (AxisState.FAULT, AxisState.FAULT_REACTION_ACTIVE)
@@ -186,9 +190,10 @@ class Fault(_Quiet):
             return False
         return self._code is None or event.code == self._code
 
-    def forget(self) -> None:
+    def forget(self, bus: str, sources: Collection[int]) -> None:
         """The next statusword has none before it."""
-        self._was.clear()
+        for source in sources:
+            self._was.pop(source, None)
 
 
 class Event(_Quiet):
@@ -206,9 +211,9 @@ class Event(_Quiet):
             return event.what is self._what
         return state_changed(self._states, event)
 
-    def forget(self) -> None:
+    def forget(self, bus: str, sources: Collection[int]) -> None:
         """The next heartbeat has none before it."""
-        self._states.clear()
+        forget_states(self._states, bus)
 
 
 def state_changed(states: dict[Node, NmtState | None], event: Happened) -> bool:
@@ -220,6 +225,12 @@ def state_changed(states: dict[Node, NmtState | None], event: Happened) -> bool:
     known = node in states
     before, states[node] = states.get(node), now
     return known and before is not now
+
+
+def forget_states(states: dict[Node, NmtState | None], bus: str) -> None:
+    """Take the devices of ``bus`` out of ``states``."""
+    for node in [one for one in states if one[0] == bus]:
+        del states[node]
 
 
 def _counts(event: Happened, nodes: frozenset[Node] | None) -> bool:

@@ -2,25 +2,26 @@
 
 from __future__ import annotations
 
-import asyncio
 from typing import Annotated, Literal
 
 from fastapi import APIRouter, Depends, Query, Request, Response
 from fastapi.responses import StreamingResponse
+from pydantic import TypeAdapter
 
 from app.errors import ScopeSettingsError
 from app.model.roles import Role
 from app.model.texts import load_texts
-from app.service.scope.capture import Capture, InForce
+from app.service.scope.capture import Capture, CaptureLine, InForce
 from app.service.scope.captures import Captures
 from app.service.scope.desk import ScopeDesk
-from app.service.scope.export import csv_lines, to_json
+from app.service.scope.export import csv_pieces, json_pieces
 from app.service.scope.in_force import Frozen, in_force
-from app.service.scope.line import ScopeLine, ScopeView, scope_line, scope_view
+from app.service.scope.line import ScopeLine, ScopeView, latest_of, scope_line, scope_view
 from app.service.scope.series import ScopeSeries, XyPoints, capture_series, xy_points
 from app.service.scope.spectrum import Spectrum, spectrum_of
 from app.web.attachment import as_attachment
 from app.web.deps import BenchOf, ConnectionOf, PersonOf, needs
+from app.web.made_apart import list_made_apart, made_apart
 from app.web.models import Nothing
 from app.web.models.scope import ArmRequest, CaptureChange, CaptureDoc, InForceDoc
 
@@ -29,6 +30,13 @@ TECHNICIAN = needs(Role.TECHNICIAN)
 CAPTURE = "/scope/captures/{capture_id}"
 Points = Annotated[int, Query(ge=10, le=20_000)]
 Name = Annotated[str, Query(max_length=250, examples=["wtg-07/blade-1/pmc/6064"])]
+_VIEW = TypeAdapter(ScopeView)
+_LINE = TypeAdapter(CaptureLine)
+_DOC = TypeAdapter(CaptureDoc)
+_SERIES = TypeAdapter(ScopeSeries)
+_SPECTRUM = TypeAdapter(Spectrum)
+_XY = TypeAdapter(XyPoints)
+_ROW = TypeAdapter(InForceDoc)
 Second = Annotated[float, Query(ge=-1e6, le=1e6, description="s since the trigger")]
 
 
@@ -55,10 +63,11 @@ async def scope(bench: BenchOf, desk: ScopeOf) -> ScopeLine:
     return scope_line(desk, bench.connection is not None)
 
 
-@router.get("/live/scope/view")
-async def scope_preview(desk: ScopeOf, points: Points = 500) -> ScopeView:
+@router.get("/live/scope/view", response_model=ScopeView)
+async def scope_preview(desk: ScopeOf, points: Points = 500) -> Response:
     """The last seconds of what it sees, while it is armed."""
-    return scope_view(desk, points)
+    latest = latest_of(desk)
+    return await made_apart(_VIEW, lambda: scope_view(latest, points))
 
 
 @router.post("/live/scope/arm", dependencies=[TECHNICIAN])
@@ -85,16 +94,18 @@ async def stop_scope(bench: BenchOf, desk: ScopeOf) -> ScopeLine:
 # -- captures ------------------------------------------------------------------------
 
 
-@router.get("/scope/captures")
-async def captures(kept: CapturesOf) -> list[CaptureDoc]:
+@router.get("/scope/captures", response_model=list[CaptureLine])
+async def captures(kept: CapturesOf) -> Response:
     """All captures, the latest first."""
-    return [CaptureDoc.of(one) for one in await kept.all()]
+    found = await kept.all()
+    return await list_made_apart(_LINE, lambda: found)
 
 
-@router.get(CAPTURE)
-async def capture(kept: CapturesOf, capture_id: str) -> CaptureDoc:
+@router.get(CAPTURE, response_model=CaptureDoc)
+async def capture(kept: CapturesOf, capture_id: str) -> Response:
     """One capture without its values."""
-    return CaptureDoc.of(await kept.head(capture_id))
+    found = await kept.head(capture_id)
+    return await made_apart(_DOC, lambda: CaptureDoc.of(found))
 
 
 @router.patch(CAPTURE, dependencies=[TECHNICIAN])
@@ -111,27 +122,28 @@ async def delete_capture(kept: CapturesOf, person: PersonOf, capture_id: str) ->
     return Nothing()
 
 
-@router.get(CAPTURE + "/series")
+@router.get(CAPTURE + "/series", response_model=list[ScopeSeries])
 async def capture_values(
     kept: CapturesOf, capture_id: str, from_s: Second | None = None, to_s: Second | None = None, points: Points = 2000
-) -> list[ScopeSeries]:
+) -> Response:
     """Its signals over time: every value where they are few, else least and greatest."""
     found = await kept.get(capture_id)
     span = _span(found, from_s, to_s)
-    return await asyncio.to_thread(capture_series, found, *span, points)
+    return await list_made_apart(_SERIES, lambda: capture_series(found, *span, points))
 
 
-@router.get(CAPTURE + "/spectrum")
+@router.get(CAPTURE + "/spectrum", response_model=Spectrum)
 async def capture_spectrum(
     kept: CapturesOf, capture_id: str, signal: Name, from_s: Second | None = None, to_s: Second | None = None
-) -> Spectrum:
+) -> Response:
     """The spectrum of one signal of it, of a stretch or of all."""
     found = await kept.get(capture_id)
     at = _signal(found, signal)
-    return await asyncio.to_thread(spectrum_of, found, at, *_span(found, from_s, to_s))
+    span = _span(found, from_s, to_s)
+    return await made_apart(_SPECTRUM, lambda: spectrum_of(found, at, *span))
 
 
-@router.get(CAPTURE + "/xy")
+@router.get(CAPTURE + "/xy", response_model=XyPoints)
 async def capture_xy(
     kept: CapturesOf,
     capture_id: str,
@@ -140,22 +152,27 @@ async def capture_xy(
     from_s: Second | None = None,
     to_s: Second | None = None,
     points: Points = 5000,
-) -> XyPoints:
+) -> Response:
     """One signal of it against another, matched by time."""
     found = await kept.get(capture_id)
     span = _span(found, from_s, to_s)
-    return await asyncio.to_thread(xy_points, found, _signal(found, x), _signal(found, y), *span, points)
+    sides = _signal(found, x), _signal(found, y)
+    return await made_apart(_XY, lambda: xy_points(found, *sides, *span, points))
 
 
-@router.get(CAPTURE + "/parameters")
-async def capture_parameters(bench: BenchOf, kept: CapturesOf, capture_id: str) -> list[InForceDoc]:
+@router.get(CAPTURE + "/parameters", response_model=list[InForceDoc])
+async def capture_parameters(bench: BenchOf, kept: CapturesOf, capture_id: str) -> Response:
     """The parameter values that were in force, each beside what is known now."""
     rows = await kept.in_force(capture_id)
     slugs = {one.device for one in rows}
     targets = () if bench.connection is None else bench.connection.targets
     frozen = [Frozen.of(target) for target in targets if target.slug in slugs]
-    now = {(one.device, one.address): one for one in await asyncio.to_thread(in_force, frozen)}
-    return [_beside(one, now.get((one.device, one.address))) for one in rows]
+
+    def beside() -> list[InForceDoc]:
+        now = {(one.device, one.address): one for one in in_force(frozen)}
+        return [_beside(one, now.get((one.device, one.address))) for one in rows]
+
+    return await list_made_apart(_ROW, beside)
 
 
 @router.get(CAPTURE + "/csv", response_class=Response)
@@ -164,9 +181,10 @@ async def capture_csv(
 ) -> Response:
     """Its values as CSV: a row an instant, a column a signal."""
     found = await kept.get(capture_id)
-    lines = csv_lines(found, load_texts(language or request.app.state.language))
+    pieces = csv_pieces(found, load_texts(language or request.app.state.language))
     headers = as_attachment(f"{_file_name(found)}.csv")
-    return StreamingResponse((line.encode() for line in lines), media_type="text/csv; charset=utf-8", headers=headers)
+    # The pieces of an iterator are made in a worker thread, one by one.
+    return StreamingResponse(pieces, media_type="text/csv; charset=utf-8", headers=headers)
 
 
 @router.get(CAPTURE + "/json", response_class=Response)
@@ -174,9 +192,8 @@ async def capture_json(kept: CapturesOf, capture_id: str) -> Response:
     """All of it as JSON."""
     found = await kept.get(capture_id)
     rows = await kept.in_force(capture_id)
-    text = await asyncio.to_thread(to_json, found, rows)
     headers = as_attachment(f"{_file_name(found)}.json")
-    return Response(text.encode(), media_type="application/json", headers=headers)
+    return StreamingResponse(json_pieces(found, rows), media_type="application/json", headers=headers)
 
 
 # ------------------------------------------------------------------------------------

@@ -4620,6 +4620,34 @@ export interface components {
             kept: boolean;
         };
         /**
+         * CaptureLine
+         * @description A capture in the list of all. Not ``kept``: it goes with the next one, or with the server.
+         */
+        CaptureLine: {
+            /** Cause */
+            cause: string;
+            /** Ended */
+            ended: string;
+            /** Id */
+            id: string;
+            /** Kept */
+            kept: boolean;
+            /** Name */
+            name: string;
+            /** Note */
+            note: string;
+            /** Person */
+            person: string;
+            /** Signals */
+            signals: number;
+            /** Trigger Ns */
+            trigger_ns: number;
+            /** Turbine */
+            turbine: string;
+            /** Turbine Name */
+            turbine_name: string;
+        };
+        /**
          * CellDoc
          * @description One value: ``shown`` in ``unit``; ``text_key`` where an enumeration names it; ``reason`` why it is unread.
          */
@@ -9042,7 +9070,8 @@ export interface components {
          * @description The scope. ``available``: a turbine is connected. Times are t_ns.
          *
          *     ``captures``: those of this arming, oldest first. ``reason_key``: why it ended by itself. ``filled``: share of its
-         *     memory, 0..1. ``unreadable``: values whose length is not their type's.
+         *     memory, 0..1. ``unreadable``: values whose length is not their type's. ``late``: values that came too late for the
+         *     capture to which they belong.
          */
         ScopeLine: {
             /** Armed Ns */
@@ -9055,6 +9084,8 @@ export interface components {
             end_ns: number | null;
             /** Filled */
             filled: number;
+            /** Late */
+            late: number;
             /** Now Ns */
             now_ns: number;
             order: components["schemas"]["ScopeOrder"] | null;
@@ -23213,7 +23244,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": components["schemas"]["CaptureDoc"][];
+                    "application/json": components["schemas"]["CaptureLine"][];
                 };
             };
             /** @description Unauthorized */

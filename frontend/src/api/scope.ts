@@ -13,6 +13,8 @@ export type ScopeSeries = Schemas["ScopeSeries"];
 export type ArmRequest = Schemas["ArmRequest"];
 export type TriggerIn = Schemas["TriggerIn"];
 export type Capture = Schemas["CaptureDoc"];
+/** A capture in the list of all. */
+export type CaptureLine = Schemas["CaptureLine"];
 export type CaptureHead = Schemas["Head"];
 export type KeptSignal = Schemas["KeptSignal"];
 export type KeptMark = Schemas["KeptMark"];
@@ -53,7 +55,7 @@ export const liveQuery = (shown: boolean) =>
 
 export const capturesQuery = queryOptions({
   queryKey: [...KEY, "captures"],
-  queryFn: ({ signal }) => get<Capture[]>(KEPT, signal),
+  queryFn: ({ signal }) => get<CaptureLine[]>(KEPT, signal),
   staleTime: 0,
   refetchInterval: IDLE_MS,
 });

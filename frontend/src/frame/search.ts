@@ -112,11 +112,14 @@ export interface PageSearch {
   /** What is laid over: recordings with their zeros, and the signals of all of them (pages/recordings/overlay/choice.ts). */
   overlay?: string;
   curves?: string;
-  /** Of the scope: signals without their turbine, the capture that is open, "fft" or "xy", captures laid over. */
+  /** Of the scope: signals without their turbine, what it waits for and for how long (pages/axis/scope/draftText.ts). */
   channels?: string;
+  trigger?: string;
+  /** The capture that is open, "fft" or "xy", captures laid over, "each" signal on an axis of its own. */
   capture?: string;
   measure?: string;
   refs?: string;
+  axes?: string;
   /** Its stretch in view and its two cursors, in s since the trigger ("-0.5..1.5"). */
   zoom?: string;
   cursors?: string;
@@ -185,9 +188,11 @@ const TEXTS = [
   "overlay",
   "curves",
   "channels",
+  "trigger",
   "capture",
   "measure",
   "refs",
+  "axes",
   "zoom",
   "cursors",
   "spectrum",

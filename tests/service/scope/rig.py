@@ -59,6 +59,7 @@ async def scope_at(connection: Connection, store: Store | None = None) -> AsyncI
     wire = Wire()
     connection.buses["can0"].driver.subscribe(wire.frames.extend)
     desk = ScopeDesk(Captures(kept, audit), connection.journal, connection.stamper, lambda: USUAL, lambda: True)
+    desk.attach(connection)
     try:
         yield desk, wire
     finally:
@@ -80,4 +81,4 @@ async def kept(desk: ScopeDesk, count: int = 1) -> list[str]:
     async with asyncio.timeout(DEADLINE_S):
         while len(found := await desk.captures.all()) < count:  # noqa: ASYNC110  the store has no event for it
             await asyncio.sleep(0.02)
-    return [one.head.id for one in found]
+    return [one.id for one in found]

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 
 from app.errors import ScopeSpectrumError
 from app.model.texts import load_texts
+from app.service.scope import export
 from app.service.scope.capture import (
     Capture,
     Head,
@@ -23,11 +24,14 @@ from app.service.scope.capture import (
     KeptSignal,
     Values,
     dump_head,
+    dump_marks,
+    line_of,
     load_head,
+    load_line,
     pack_values,
     unpack_values,
 )
-from app.service.scope.export import csv_lines, scaled_text, to_json
+from app.service.scope.export import INSTANTS, NUMBERS, csv_pieces, json_pieces, scaled_numbers, scaled_text
 from app.service.scope.series import capture_series, xy_points
 from app.service.scope.spectrum import spectrum_of
 from tests.service.scope.rig import AXIS, POSITION, order
@@ -36,6 +40,13 @@ ZERO_NS = 1_750_000_000_000_000_000
 S = 1_000_000_000
 
 Fed = list[tuple[float, int]]
+Step = tuple[int, int]
+
+
+def fed(steps: list[Step]) -> Fed:
+    """Values with their distances in ms."""
+    times = np.cumsum([dt_ms for dt_ms, _ in steps], dtype=int).tolist()
+    return [(t_ms / 1000, raw) for t_ms, (_, raw) in zip(times, steps, strict=True)]
 
 
 def capture(*signals: Fed, scale: str = "0.01", marks: tuple[KeptMark, ...] = ()) -> Capture:
@@ -169,26 +180,71 @@ def test_xy_takes_of_both_what_was_seen_last() -> None:
 
 def test_csv_has_a_row_an_instant_and_nothing_is_carried_on() -> None:
     one = capture([(-0.5, -7), (0.0, 8000), (0.0, 8001)], [(0.0, 5), (0.25, 6)])
-    english = "".join(csv_lines(one, load_texts("en")))
+    english = b"".join(csv_pieces(one, load_texts("en"))).decode()
     rows = list(csv.reader(io.StringIO(english.removeprefix("\ufeff"))))
     assert rows[0][:2] == ["time since trigger [s]", "t_ns"]
     assert rows[0][2] == "blade-1/pmc position actual value [°]"
     assert [row[0] for row in rows[1:]] == ["-0.500000000", "0.000000000", "0.000000000", "0.250000000"]
     assert [row[2:] for row in rows[1:]] == [["-0.07", ""], ["80.00", "0.05"], ["80.01", ""], ["", "0.06"]]
     assert rows[2][1] == str(ZERO_NS)
-    german = "".join(csv_lines(one, load_texts("de"))).removeprefix("\ufeff").splitlines()
+    german = b"".join(csv_pieces(one, load_texts("de"))).decode().removeprefix("\ufeff").splitlines()
     assert german[1] == f"-0,500000000;{ZERO_NS - S // 2};-0,07;"
 
 
 def test_json_holds_all_of_it() -> None:
     one = capture([(0.0, 8000), (0.5, 8001)])
     rows = [InForce(AXIS, "6065", "following error window", "500", "5.00", "°", None, False, "proven", True)]
-    plain = json.loads(to_json(one, rows))
+    plain = json.loads(b"".join(json_pieces(one, rows)))
     assert plain["signals"][0]["raw"] == [8000, 8001]
     assert plain["signals"][0]["scaled"] == [80.0, 80.01]
     assert plain["order"]["trigger"]["kind"] == "manual"
     assert plain["in_force"][0]["stored"] == "proven"
     assert plain["recording"] == "wtg-07-001.mcap"
+
+
+@given(
+    st.lists(st.tuples(st.integers(0, 3), st.integers(-9, 9)), max_size=40),
+    st.lists(st.tuples(st.integers(0, 3), st.integers(-9, 9)), max_size=40),
+    st.integers(1, 5),
+)
+def test_files_in_pieces_hold_every_value_once(first: list[Step], second: list[Step], size: int) -> None:
+    """Whatever falls on one instant, and wherever a piece ends."""
+    one = capture(fed(first), fed(second), scale="0.1", marks=tuple(gap(n / 10) for n in range(7)))
+    with pytest.MonkeyPatch.context() as patch:
+        for name in ("INSTANTS", "NUMBERS", "ROWS"):
+            patch.setattr(export, name, size)
+        text = b"".join(csv_pieces(one, load_texts("en"))).decode().removeprefix("\ufeff")
+        plain = json.loads(b"".join(json_pieces(one, [])))
+    rows = list(csv.reader(io.StringIO(text)))[1:]
+    for column, values in enumerate(one.values):
+        told = [(int(row[1]), row[2 + column]) for row in rows if row[2 + column] != ""]
+        assert [t_ns for t_ns, _ in told] == values.t_ns.tolist()
+        assert [float(cell) for _, cell in told] == [raw / 10 for raw in values.raw.tolist()]
+        kept = plain["signals"][column]
+        assert (kept["t_ns"], kept["raw"]) == (values.t_ns.tolist(), values.raw.tolist())
+        assert kept["scaled"] == [raw / 10 for raw in values.raw.tolist()]
+    assert all(any(row[2:]) for row in rows)
+    assert [int(row[1]) for row in rows] == sorted(int(row[1]) for row in rows)
+    assert len(plain["marks"]) == 7
+
+
+def test_no_piece_of_a_large_file_is_large() -> None:
+    """Each piece is made in one go, and nothing else of the program runs for the time that a call for it takes."""
+    count = 40_000
+    one = capture([(n / 1000, n) for n in range(count)], [(n / 1000 + 0.0005, n) for n in range(count)])
+    row = InForce(AXIS, "6065", "following error window", "500", "5.00", "°", None, False, "proven", True)
+    for pieces, least in (
+        (list(csv_pieces(one, load_texts("en"))), 2 * count // INSTANTS),
+        (list(json_pieces(one, [row] * 2000)), 6 * count // NUMBERS),
+    ):
+        assert len(pieces) >= least
+        assert max(map(len, pieces)) < 100_000
+
+
+@given(st.lists(st.integers(-(2**63), 2**63 - 1), max_size=20), st.sampled_from(["1", "0.01", "0.1", "0.3", "10"]))
+def test_scaled_numbers_are_the_nearest_floats(raws: list[int], scale: str) -> None:
+    step = Decimal(scale)
+    assert scaled_numbers(np.array(raws, np.int64), step) == [float(raw * step) for raw in raws]
 
 
 @given(st.integers(-(2**63), 2**63 - 1), st.sampled_from(["1", "0.01", "0.1", "0.001", "10"]))
@@ -199,7 +255,10 @@ def test_scaled_values_have_all_their_digits(raw: int, scale: str) -> None:
 @given(st.lists(st.integers(-(2**31), 2**31 - 1), max_size=50))
 def test_what_is_kept_comes_back(raws: list[int]) -> None:
     one = capture([(n / 1000, raw) for n, raw in enumerate(raws)], [], marks=(gap(0.1),))
-    assert load_head(dump_head(one.head)) == one.head
+    text = dump_head(one.head)
+    assert "marks" not in text, "a list of captures reads no marks"
+    assert load_head(text, dump_marks(one.head)) == one.head
+    assert load_line(text) == line_of(one.head, True)
     for before, after in zip(one.values, unpack_values(pack_values(one.values)), strict=True):
         assert before.t_ns.tolist() == after.t_ns.tolist()
         assert before.raw.tolist() == after.raw.tolist()

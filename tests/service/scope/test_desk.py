@@ -8,14 +8,16 @@ from pathlib import Path
 
 import pytest
 
-from app.errors import ScopeSettingsError, ScopeStateError, ScopeUnknownError
+from app.errors import NotConnectedError, ScopeSettingsError, ScopeStateError, ScopeUnknownError
 from app.model.address import Address
 from app.service.connection import Connection
 from app.service.polling import USUAL
 from app.service.scope.engine import Cause, Ended
-from app.service.scope.line import scope_line, scope_view
+from app.service.scope.line import latest_of, scope_line, scope_view
+from app.service.scope.tap import PORTION
 from app.store.store import Store
 from app.wire.nmt import NmtCommand, NmtState
+from app.wire.records import Source, ValueSeen
 from tests.service.conftest import Served
 from tests.service.scope.rig import (
     AXIS,
@@ -29,12 +31,14 @@ from tests.service.scope.rig import (
     trigger,
     until,
 )
+from tests.web.rig import Feeder, make_connection
 
 NODE = 11
 TPDO1 = 0x18B
 COB_ID, EVENT_TIMER = Address(0x1800, 1), Address(0x1800, 5)
 DISABLED = 1 << 31
 PERIOD_MS = 5
+MS = 1_000_000
 
 
 async def operational(connection: Connection, cyclic: bool = False) -> None:
@@ -92,7 +96,7 @@ async def test_what_no_pdo_carries_is_polled_and_says_so(connection: Connection)
         assert [one.way for one in line.signals] == ["polled", "polled"]
         assert [one.unit for one in line.signals] == ["°", "V"]
         assert connection.buses["can0"].bus_load(connection.stamper()) < USUAL.load_cap + 0.15
-        view = scope_view(desk, 400)
+        view = scope_view(latest_of(desk), 400)
         assert [one.signal for one in view.series] == [POSITION, f"{POWER}/3063"]
         assert view.series[0].low[-1] == pytest.approx(80.0, abs=0.5), "in degrees"
         await desk.stop()
@@ -210,6 +214,72 @@ async def test_the_end_of_the_connection_keeps_what_came(connection: Connection)
         assert all(link.listeners == () for link in connection.buses.values())
 
 
+async def test_what_waits_for_the_loop_at_the_end_is_in_the_capture() -> None:
+    """Values that crossed the wire before the stop, and that the event loop had not taken yet."""
+    connection = make_connection()
+    async with scope_at(connection) as (desk, _wire):
+        await desk.arm(connection, order(STATUSWORD, total_s=60.0, pre_s=0.0), "tester")
+        desk.trigger_now()
+        count = 2 * PORTION + 7
+        for word in range(count):
+            Feeder(connection).read(NODE, Address(0x6041), word.to_bytes(2, "little"))
+        await desk.stop()
+        (found,) = await kept(desk)
+        capture = await desk.captures.get(found)
+        assert capture.values[0].raw.tolist() == list(range(count))
+        assert capture.head.marks == ()
+
+
+async def test_a_capture_is_taken_out_only_once_all_of_it_was_handed_over() -> None:
+    """Its end is long over, and most of its values still wait in the queue: none is lost, and none comes too late."""
+    connection = make_connection()
+    async with scope_at(connection) as (desk, _wire):
+        on = trigger(kind="level", signal=STATUSWORD, level=-1.0, side="above")
+        run = await desk.arm(connection, order(STATUSWORD, on=on, total_s=0.1, pre_s=0.0), "tester")
+        await until(lambda: connection.stamper() > run.armed_ns + 500 * MS)
+        begin_ns = run.armed_ns + MS
+        words = [(begin_ns + n * 20_000, n % 0x10000) for n in range(6 * PORTION)]
+        run.tap.hear(
+            [
+                ValueSeen(t_ns, "can0", NODE, Address(0x6041), word.to_bytes(2, "little"), Source.PDO_TX)
+                for t_ns, word in words
+            ]
+        )
+        (found,) = await kept(desk)
+        capture = await desk.captures.get(found)
+        expected = [(t_ns, word) for t_ns, word in words if t_ns <= begin_ns + 100 * MS]
+        assert len(expected) > 4 * PORTION
+        assert list(zip(capture.values[0].t_ns.tolist(), capture.values[0].raw.tolist(), strict=True)) == expected
+        assert scope_line(desk, True).late == 0
+
+
+async def test_a_defect_of_ours_keeps_what_came_and_says_so() -> None:
+    connection = make_connection()
+    async with scope_at(connection) as (desk, _wire):
+        run = await desk.arm(connection, order(STATUSWORD, total_s=60.0, pre_s=0.0), "tester")
+        desk.trigger_now()
+        feeder = Feeder(connection)
+        feeder.read(NODE, Address(0x6041), b"\x21\x00")
+        run.tap._wanted = None  # type: ignore[assignment]
+        feeder.read(NODE, Address(0x6041), b"\x27\x00")
+        (found,) = await kept(desk)
+        capture = await desk.captures.get(found)
+        assert capture.values[0].raw.tolist() == [0x21]
+        assert [(one.what, one.bus, one.detail) for one in capture.head.marks] == [("gap", "can0", "scope.gap.defect")]
+        assert capture.breaks_s(0)[0] > capture.values[0].t_s(capture.head.trigger_ns)[-1]
+        line = scope_line(desk, True)
+        assert (line.phase, line.reason_key) == ("done", "scope.over.defect")
+
+
+async def test_it_is_armed_for_what_is_served_alone(connection: Connection) -> None:
+    async with scope_at(connection) as (desk, _wire):
+        await desk.detach()
+        with pytest.raises(NotConnectedError):
+            await desk.arm(connection, order(POSITION), "tester")
+        assert desk.run is None
+        assert all(link.listeners == () for link in connection.buses.values())
+
+
 async def test_captures_survive_a_restart(connection: Connection, tmp_path: Path) -> None:
     store = Store.open(tmp_path / "data")
     async with scope_at(connection, store) as (desk, _wire):
@@ -242,13 +312,13 @@ async def test_auto_without_a_trigger_shows_one_and_keeps_none_but_by_name(conne
         await desk.arm(connection, order(POSITION, on=on, mode="auto", auto_s=0.2, total_s=0.2, pre_s=0.1), "tester")
         (first,) = await kept(desk)
         async with asyncio.timeout(DEADLINE_S):
-            while first in [one.head.id for one in await desk.captures.all()]:  # noqa: ASYNC110  no event tells it
+            while first in [one.id for one in await desk.captures.all()]:  # noqa: ASYNC110  no event tells it
                 await asyncio.sleep(0.02)
         await desk.stop()
         (listed,) = await desk.captures.all()
         assert not listed.kept
-        assert listed.head.cause == Cause.AUTO.value
-        await desk.captures.change(listed.head.id, "at rest", "", "tester")
+        assert listed.cause == Cause.AUTO.value
+        await desk.captures.change(listed.id, "at rest", "", "tester")
         (listed,) = await desk.captures.all()
         assert listed.kept
 

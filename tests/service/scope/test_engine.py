@@ -30,6 +30,7 @@ S = 1_000_000_000
 SINGLE = Timing(total_ns=100 * MS, pre_ns=40 * MS, mode=Mode.SINGLE, hold_off_ns=0, auto_ns=S)
 NORMAL = replace(SINGLE, mode=Mode.NORMAL)
 WHOLE = (Channel(0, None, "q"),)
+BUSES = ("can0", "can0")
 
 Fed = list[tuple[int, int]]
 
@@ -49,7 +50,7 @@ def run(
     fed: Fed, trigger: Trigger, timing: Timing, max_samples: int = 1_000_000, ticks: bool = True
 ) -> tuple[Engine, list[Caught]]:
     """Feed all, the clock going with it, and let the clock go on until nothing is under way."""
-    engine, caught = Engine(WHOLE, trigger, timing, 0, max_samples=max_samples), []
+    engine, caught = Engine(WHOLE, trigger, timing, 0, BUSES, max_samples=max_samples), []
     for t_ns, number in fed:
         engine.value(0, t_ns, number, True)
         if ticks:
@@ -131,7 +132,7 @@ def test_an_edge_needs_a_value_before_it_and_a_level_does_not() -> None:
 
 
 def test_a_gap_takes_what_was_before_an_edge_and_marks_the_capture() -> None:
-    engine = Engine(WHOLE, Edge(0, None, 3, Slope.RISING), SINGLE, 0)
+    engine = Engine(WHOLE, Edge(0, None, 3, Slope.RISING), SINGLE, 0, BUSES)
     engine.value(0, MS, 0, True)
     engine.gap(2 * MS, "can0", "gap.reason")
     engine.value(0, 3 * MS, 5, True)
@@ -143,8 +144,37 @@ def test_a_gap_takes_what_was_before_an_edge_and_marks_the_capture() -> None:
     assert [(mark.what, mark.t_ns, mark.bus) for mark in one.marks] == [("gap", 2 * MS, "can0")]
 
 
+def test_a_gap_of_another_bus_takes_nothing() -> None:
+    """What was seen on this bus still tells an edge, a state and a fault: the loss is not its own."""
+    for lost, fired in (("can1", 4 * MS), ("can0", None)):
+        engine = Engine(WHOLE, Edge(0, None, 3, Slope.RISING), SINGLE, 0, ("can0", "can1"))
+        engine.value(0, MS, 0, True)
+        engine.gap(2 * MS, lost, "gap.reason")
+        engine.value(0, 4 * MS, 5, True)
+        assert (engine.window and engine.window.trigger_ns) == fired
+    words = (0x0027, 0x0008)
+    for trigger in (Fault(frozenset({0, 1}), None, None), StateChange(frozenset({0, 1}))):
+        trigger.value(0, words[0])
+        trigger.value(1, words[0])
+        trigger.forget("can1", (1,))
+        assert [trigger.value(0, words[1]), trigger.value(1, words[1])] == [True, False]
+    event = Event(What.NMT, None)
+    event.happened(nmt(1, NmtState.OPERATIONAL))
+    event.forget("can1", ())
+    assert event.happened(nmt(2, NmtState.STOPPED))
+
+
+def test_what_comes_after_its_capture_was_taken_out_is_counted() -> None:
+    engine = Engine(WHOLE, Level(0, None, 3, Side.ABOVE), SINGLE, 0, BUSES)
+    engine.value(0, 50 * MS, 5, True)
+    (one,) = engine.advance(S)
+    engine.value(0, one.window.end_ns, 5, True)
+    engine.value(0, one.window.end_ns + 1, 5, True)
+    assert engine.late == 1
+
+
 def test_a_pre_trigger_shorter_than_wanted_says_so() -> None:
-    engine = Engine(WHOLE, Level(0, None, 3, Side.ABOVE), SINGLE, 10 * MS)
+    engine = Engine(WHOLE, Level(0, None, 3, Side.ABOVE), SINGLE, 10 * MS, BUSES)
     engine.value(0, 15 * MS, 5, True)
     (one,) = engine.advance(S)
     assert (one.window.start_ns, one.window.known_ns) == (-25 * MS, 10 * MS)
@@ -166,7 +196,7 @@ def test_memory_is_bounded_and_a_capture_that_ran_out_says_so(fed: Fed, most: in
 
 
 def test_by_hand_and_stopping_early() -> None:
-    engine = Engine(WHOLE, Manual(), NORMAL, 0)
+    engine = Engine(WHOLE, Manual(), NORMAL, 0, BUSES)
     for at in range(1, 30):
         engine.value(0, at * MS, at, True)
     assert engine.advance(29 * MS) == []
@@ -182,7 +212,7 @@ def test_by_hand_and_stopping_early() -> None:
 
 
 def test_auto_begins_by_itself_where_no_trigger_comes() -> None:
-    engine = Engine(WHOLE, Edge(0, None, 3, Slope.RISING), replace(SINGLE, mode=Mode.AUTO, auto_ns=S), 0)
+    engine = Engine(WHOLE, Edge(0, None, 3, Slope.RISING), replace(SINGLE, mode=Mode.AUTO, auto_ns=S), 0, BUSES)
     caught = []
     for at in range(0, 4000, 10):
         engine.value(0, at * MS, 5 if at >= 2000 else 0, True)
@@ -194,7 +224,7 @@ def test_auto_begins_by_itself_where_no_trigger_comes() -> None:
 
 
 def test_a_late_value_of_another_bus_is_in_the_capture() -> None:
-    engine = Engine((Channel(0, None, "q"), Channel(1, None, "q")), Level(0, None, 3, Side.ABOVE), SINGLE, 0)
+    engine = Engine((Channel(0, None, "q"), Channel(1, None, "q")), Level(0, None, 3, Side.ABOVE), SINGLE, 0, BUSES)
     engine.value(0, 50 * MS, 5, True)
     engine.value(1, 45 * MS, 7, False)  # handed over after the trigger, seen before it
     (one,) = engine.advance(S)
@@ -204,7 +234,7 @@ def test_a_late_value_of_another_bus_is_in_the_capture() -> None:
 
 def test_a_bit_of_a_word_is_a_signal_of_its_own() -> None:
     channels = (Channel(0, None, "q"), Channel(0, 3, "B"))
-    engine = Engine(channels, Change(0, 3), SINGLE, 0)
+    engine = Engine(channels, Change(0, 3), SINGLE, 0, BUSES)
     for at, word in enumerate((0x21, 0x08, 0x0F, 0x21), 1):
         engine.value(0, at * MS, word, True)
     (one,) = engine.advance(S)
@@ -213,7 +243,7 @@ def test_a_bit_of_a_word_is_a_signal_of_its_own() -> None:
 
 
 def test_an_unsigned_number_of_64_bits_is_kept_exactly() -> None:
-    engine = Engine((Channel(0, None, "Q"),), Manual(), SINGLE, 0)
+    engine = Engine((Channel(0, None, "Q"),), Manual(), SINGLE, 0, BUSES)
     engine.value(0, MS, 2**64 - 1, True)
     engine.trigger_now(2 * MS)
     (one,) = engine.advance(S)
@@ -265,7 +295,7 @@ def test_the_state_of_an_axis_changes_by_state_and_not_by_word() -> None:
 
 
 def test_only_changes_of_the_nmt_state_are_marked() -> None:
-    engine = Engine(WHOLE, Event(What.NMT, None), SINGLE, 0)
+    engine = Engine(WHOLE, Event(What.NMT, None), SINGLE, 0, BUSES)
     for at in range(1, 20):
         engine.happened(nmt(at * MS, NmtState.OPERATIONAL))
     assert engine.window is None

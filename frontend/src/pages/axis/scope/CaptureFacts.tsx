@@ -20,7 +20,20 @@ import { secondsText } from "./traces";
 
 const MARKS_SHOWN = 20;
 
-/** What a capture is, who made it, what happened in it, and what can be done with it. */
+/** What a capture is, and who made it. */
+export function CaptureTitle({ capture }: { capture: Capture }) {
+  const t = useTexts();
+  return (
+    <div className={classes.captureTitle}>
+      <h2 data-testid="capture-name">{capture.head.name}</h2>
+      <p className={classes.told} data-testid="capture-facts">
+        {factsOf(capture, t).join(" · ")}
+      </p>
+    </div>
+  );
+}
+
+/** What happened in a capture, and what can be done with it. */
 export function CaptureFacts({ capture }: { capture: Capture }) {
   const t = useTexts();
   const { head, kept } = capture;
@@ -31,7 +44,6 @@ export function CaptureFacts({ capture }: { capture: Capture }) {
   return (
     <section className={classes.facts} aria-label={head.name}>
       <div className={classes.factsHead}>
-        <h2 data-testid="capture-name">{head.name}</h2>
         <Button
           variant="default"
           leftSection={<IconPencil size={17} aria-hidden />}
@@ -54,9 +66,6 @@ export function CaptureFacts({ capture }: { capture: Capture }) {
         </Button>
       </div>
       {head.note !== "" && <p className={classes.note}>{head.note}</p>}
-      <p className={classes.told} data-testid="capture-facts">
-        {factsOf(capture, t).join(" · ")}
-      </p>
       <Marks capture={capture} />
       {editing && <Edit capture={capture} onClose={() => setEditing(false)} />}
     </section>

@@ -1,6 +1,7 @@
 import { Button, SegmentedControl } from "@mantine/core";
 import {
   IconDownload,
+  IconLayoutRows,
   IconPhoto,
   IconRulerMeasure,
   IconZoomIn,
@@ -12,6 +13,7 @@ import { useMemo, useRef, useState } from "react";
 import type UPlot from "uplot";
 import {
   type Capture,
+  type CaptureLine,
   captureQuery,
   csvOfCapture,
   jsonOfCapture,
@@ -20,18 +22,29 @@ import {
 } from "../../../api/scope";
 import { usePageSearch } from "../../../frame/search";
 import { spanAt } from "../../../model/tracks";
-import { useTexts } from "../../../texts/texts";
+import { localise } from "../../../model/values";
+import { type Translate, useTexts } from "../../../texts/texts";
 import { useDeviceName } from "../../../ui/devices";
 import { dayAndTime } from "../../../ui/format";
 import { ProblemAlert } from "../../../ui/ProblemAlert";
-import { CaptureFacts } from "./CaptureFacts";
+import { CaptureFacts, CaptureTitle } from "./CaptureFacts";
 import { InForce } from "./InForce";
 import { Measure } from "./Measure";
 import { headingOf, pictureOf, savePicture } from "./png";
 import classes from "./Scope.module.css";
 import { ScopePlots } from "./ScopePlots";
 import { SpectrumView } from "./SpectrumView";
-import { groupsOf, referenceTraces, spanText, type Trace, tracesOf } from "./traces";
+import {
+  EACH,
+  groupsOf,
+  referenceTraces,
+  numberText,
+  secondsText,
+  spanText,
+  type Trace,
+  tracesOf,
+  valueAt,
+} from "./traces";
 import { listOf, type Pair, pairText, parsePair, within, zoomed, zoomOf } from "./view";
 import { XyView } from "./XyView";
 
@@ -41,7 +54,7 @@ const VIEWS = ["time", "fft", "xy"] as const;
 
 interface Props {
   id: string;
-  captures: readonly Capture[];
+  captures: readonly CaptureLine[];
   armed: boolean;
 }
 
@@ -69,7 +82,8 @@ function Shown({ capture, captures, armed }: Omit<Props, "id"> & { capture: Capt
   const [hoverS, setHoverS] = useState<number | null>(null);
   const [drawn] = useState(() => new Map<string, UPlot>());
   const traces = useTraces(head, captures, view, search.zoom !== undefined);
-  const groups = useMemo(() => groupsOf(traces), [traces]);
+  const each = search.axes === EACH;
+  const groups = useMemo(() => groupsOf(traces, each), [traces, each]);
   const own = useMemo(() => traces.filter((one) => one.reference === null), [traces]);
   const marks = useMemo(
     () => head.marks.map((one) => ({ atS: (one.t_ns - head.trigger_ns) / 1e9, what: one.what })),
@@ -80,13 +94,14 @@ function Shown({ capture, captures, armed }: Omit<Props, "id"> & { capture: Capt
   const save = () => {
     const picture = {
       title: head.name,
-      about: [head.turbine_name, dayAndTime(head.trigger_ns / 1e6), head.person].join(", "),
+      about: aboutText(head, t),
       plots: [...drawn].map(([key, made]) => {
         const group = groups.find((one) => one.key === key);
         return { made, heading: group ? headingOf(group, t("page.scope.plot_bits")) : key.toUpperCase() };
       }),
       legend: traces.map((trace) => ({ trace, text: legendOf(trace, cursors, t) })),
       axis: measure === "time" ? t("page.scope.time_axis") : "",
+      between: measure === "time" && cursors ? betweenText(cursors, t) : "",
       view,
       cursors: measure === "time" ? cursors : null,
     };
@@ -118,6 +133,17 @@ function Shown({ capture, captures, armed }: Omit<Props, "id"> & { capture: Capt
           {t("page.scope.cursors")}
         </Button>
         <Zoom view={view} whole={whole} onView={show} />
+        <Button
+          variant={each ? "light" : "default"}
+          px={10}
+          aria-pressed={each}
+          aria-label={t("page.scope.axes_each")}
+          title={t("page.scope.axes_each")}
+          onClick={() => update({ axes: each ? undefined : EACH })}
+          data-testid="axes-each"
+        >
+          <IconLayoutRows size={18} aria-hidden />
+        </Button>
         <span className={classes.spacer} />
         <Button
           component="a"
@@ -148,6 +174,7 @@ function Shown({ capture, captures, armed }: Omit<Props, "id"> & { capture: Capt
           {t("page.scope.png")}
         </Button>
       </div>
+      <CaptureTitle capture={capture} />
       {measure === "time" && (
         <>
           <ScopePlots
@@ -181,7 +208,12 @@ function Shown({ capture, captures, armed }: Omit<Props, "id"> & { capture: Capt
 }
 
 /** The signals of a capture in view, and of those that are laid over it. */
-function useTraces(head: CaptureHead, captures: readonly Capture[], view: Pair, isZoomed: boolean): Trace[] {
+function useTraces(
+  head: CaptureHead,
+  captures: readonly CaptureLine[],
+  view: Pair,
+  isZoomed: boolean,
+): Trace[] {
   const t = useTexts();
   const deviceName = useDeviceName();
   const [search] = usePageSearch();
@@ -196,7 +228,7 @@ function useTraces(head: CaptureHead, captures: readonly Capture[], view: Pair, 
     if (!values) return [];
     const own = tracesOf(head.signals, values, deviceName, t);
     const over = ids.flatMap((id, at) => {
-      const name = captures.find((one) => one.head.id === id)?.head.name ?? id;
+      const name = captures.find((one) => one.id === id)?.name ?? id;
       const series = laid[at];
       return series ? referenceTraces(own, series, name, at) : [];
     });
@@ -216,7 +248,26 @@ function legendOf(trace: Trace, cursors: Pair | null, t: ReturnType<typeof useTe
   const name = `${trace.label}${trace.unit === "" ? "" : ` [${trace.unit}]`}${note}`;
   if (!cursors) return name;
   const [a, b] = cursors.map((atS) => `${spanText(spanAt(trace.track, atS), trace, t)}${unit}`);
-  return `${name}   A ${a ?? "–"}   B ${b ?? "–"}`;
+  const [atA, atB] = cursors.map((atS) => valueAt(trace, atS) ?? NaN);
+  const difference = (atB ?? NaN) - (atA ?? NaN);
+  const delta = Number.isNaN(difference) ? "–" : `${numberText(difference, trace.decimals, t)}${unit}`;
+  return `${name}   A ${a ?? "–"}   B ${b ?? "–"}   Δ ${delta}`;
+}
+
+function aboutText(head: CaptureHead, t: Translate): string {
+  const facts = [
+    head.turbine_name,
+    dayAndTime(head.trigger_ns / 1e6),
+    head.person,
+    t(`page.scope.cause_${head.cause}`),
+  ];
+  return [...facts, ...(head.twin ? [t("page.scope.twin")] : [])].join(", ");
+}
+
+function betweenText([a, b]: Pair, t: Translate): string {
+  const frequency = a === b ? "–" : `${localise((1 / Math.abs(b - a)).toPrecision(4), t.language)} Hz`;
+  const times = `A ${secondsText(a, t, 6)} s   B ${secondsText(b, t, 6)} s   Δt ${secondsText(b - a, t, 6)} s`;
+  return `${times}   1/Δt ${frequency}`;
 }
 
 function Zoom({ view, whole, onView }: { view: Pair; whole: Pair; onView: (view: Pair | null) => void }) {

@@ -1,14 +1,14 @@
 import { Button, Checkbox, TextInput } from "@mantine/core";
 import { IconFilter } from "@tabler/icons-react";
 import { useState } from "react";
-import type { Capture } from "../../../api/scope";
+import type { CaptureLine } from "../../../api/scope";
 import { useTexts } from "../../../texts/texts";
 import { dayAndTime } from "../../../ui/format";
 import classes from "./Scope.module.css";
 import { MAX_REFERENCES } from "./traces";
 
 interface Props {
-  captures: readonly Capture[];
+  captures: readonly CaptureLine[];
   open: string | undefined;
   references: readonly string[];
   onOpen: (id: string) => void;
@@ -21,8 +21,8 @@ export function CapturesPanel({ captures, open, references, onOpen, onReferences
   const [typed, setTyped] = useState("");
   if (captures.length === 0) return <p className={classes.told}>{t("page.scope.captures_none")}</p>;
   const words = typed.toLowerCase();
-  const shown = captures.filter(({ head }) =>
-    `${head.name} ${head.note} ${head.person} ${head.turbine_name}`.toLowerCase().includes(words),
+  const shown = captures.filter((one) =>
+    `${one.name} ${one.note} ${one.person} ${one.turbine_name}`.toLowerCase().includes(words),
   );
   return (
     <div className={classes.panel}>
@@ -34,43 +34,43 @@ export function CapturesPanel({ captures, open, references, onOpen, onReferences
         onChange={(event) => setTyped(event.currentTarget.value)}
       />
       <ul className={classes.captures} data-testid="captures">
-        {shown.map(({ head, kept }) => (
-          <li key={head.id} data-open={head.id === open}>
+        {shown.map((one) => (
+          <li key={one.id} data-open={one.id === open}>
             <Button
-              variant={head.id === open ? "light" : "subtle"}
+              variant={one.id === open ? "light" : "subtle"}
               justify="flex-start"
               h="auto"
               mih={44}
               py={4}
               fullWidth
-              aria-current={head.id === open}
-              onClick={() => onOpen(head.id)}
+              aria-current={one.id === open}
+              onClick={() => onOpen(one.id)}
               data-testid="open-capture"
             >
               <span className={classes.captureText}>
-                <span>{head.name}</span>
+                <span>{one.name}</span>
                 <small>
                   {[
-                    head.turbine_name,
-                    dayAndTime(head.trigger_ns / 1e6),
-                    t(`page.scope.cause_${head.cause}`),
-                    ...(kept ? [] : [t("page.scope.not_kept")]),
+                    one.turbine_name,
+                    dayAndTime(one.trigger_ns / 1e6),
+                    t(`page.scope.cause_${one.cause}`),
+                    ...(one.kept ? [] : [t("page.scope.not_kept")]),
                   ].join(" · ")}
                 </small>
               </span>
             </Button>
             <Checkbox
               label={t("page.scope.reference_short")}
-              aria-label={t("page.scope.reference", { name: head.name })}
-              checked={references.includes(head.id)}
+              aria-label={t("page.scope.reference", { name: one.name })}
+              checked={references.includes(one.id)}
               disabled={
-                head.id === open || (!references.includes(head.id) && references.length >= MAX_REFERENCES)
+                one.id === open || (!references.includes(one.id) && references.length >= MAX_REFERENCES)
               }
               onChange={(event) =>
                 onReferences(
                   event.currentTarget.checked
-                    ? [...references, head.id]
-                    : references.filter((one) => one !== head.id),
+                    ? [...references, one.id]
+                    : references.filter((id) => id !== one.id),
                 )
               }
               data-testid="reference"

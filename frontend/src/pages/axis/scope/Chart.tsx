@@ -10,6 +10,9 @@ import { useWidth } from "./ScopePlots";
 
 const LEFT_PX = 64;
 const MARGIN = 0.06;
+/** What hardly changes is not blown up: half the axis spans this share of it at least. */
+const FLAT = 0.005;
+const LEAST = 1e-6;
 /** So many points at most are dots as well. */
 const DOTS = 3000;
 const DOT_PX = 2;
@@ -97,8 +100,10 @@ function rangeOf(values: readonly (number | null)[], fromZero: boolean): [number
     if (one > high) high = one;
   }
   if (low > high) return [0, 1];
-  const apart = Math.max(high - low, Math.abs(high) * 1e-3, 0.01);
-  return [fromZero ? 0 : low - apart * MARGIN, high + apart * MARGIN];
+  if (fromZero) return [0, high + Math.max(high, LEAST) * MARGIN];
+  const half = Math.max((high - low) * (0.5 + MARGIN), Math.abs(high) * FLAT, LEAST);
+  const middle = (low + high) / 2;
+  return [middle - half, middle + half];
 }
 
 function paintCurve(

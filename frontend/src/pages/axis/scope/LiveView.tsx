@@ -1,18 +1,19 @@
 import { useQuery } from "@tanstack/react-query";
-import { useMemo, useState } from "react";
+import { type ReactNode, useMemo, useState } from "react";
 import type UPlot from "uplot";
 import { isArmed, liveQuery, type ScopeLine } from "../../../api/scope";
+import { usePageSearch } from "../../../frame/search";
 import { useTexts } from "../../../texts/texts";
 import { useDeviceName } from "../../../ui/devices";
 import { Measure } from "./Measure";
 import classes from "./Scope.module.css";
 import { ScopePlots } from "./ScopePlots";
-import { groupsOf, tracesOf } from "./traces";
+import { EACH, groupsOf, tracesOf } from "./traces";
 
 const NO_MARKS: readonly never[] = [];
 
-/** What comes in just now, while the scope is armed. */
-export function LiveView({ line }: { line: ScopeLine | undefined }) {
+/** What comes in just now, while the scope is armed; else `children`. */
+export function LiveView({ line, children }: { line: ScopeLine | undefined; children: ReactNode }) {
   const t = useTexts();
   const armed = isArmed(line);
   const deviceName = useDeviceName();
@@ -24,8 +25,9 @@ export function LiveView({ line }: { line: ScopeLine | undefined }) {
     () => (data && signals ? tracesOf(signals, data.series, deviceName, t) : []),
     [data, signals, deviceName, t],
   );
-  const groups = useMemo(() => groupsOf(traces), [traces]);
-  if (!armed) return <p className={classes.empty}>{t("page.scope.empty_idle")}</p>;
+  const [search] = usePageSearch();
+  const groups = useMemo(() => groupsOf(traces, search.axes === EACH), [traces, search.axes]);
+  if (!armed) return children;
   if (!data || traces.length === 0) return <p className={classes.empty}>{t("page.scope.empty_waiting")}</p>;
   return (
     <div className={classes.shown} data-testid="scope-live">

@@ -44,8 +44,9 @@ export function ScopeControl({ line, draft, chosen, replayed, why, locked, onArm
         <p className={classes.state} role="status" data-phase={line?.phase} data-testid="scope-state">
           <i aria-hidden />
           <span>
-            <strong>{t(`page.scope.state_${line?.phase ?? "idle"}`)}</strong>
+            <strong>{t(stateOf(line))}</strong>
             <small className="dim">{line ? factsOf(line, t) : ""}</small>
+            {armed && line && <Filled line={line} />}
           </span>
         </p>
       )}
@@ -54,7 +55,10 @@ export function ScopeControl({ line, draft, chosen, replayed, why, locked, onArm
           <IconLock size={17} aria-hidden /> {t("page.scope.locked")}
         </span>
       ) : (
-        <div className={classes.buttons} title={why ?? undefined}>
+        <div
+          className={classes.buttons}
+          title={why ?? (order === null ? t("page.scope.arm_missing") : undefined)}
+        >
           <Button
             leftSection={<IconTarget size={18} aria-hidden />}
             disabled={locked || order === null || arming.isPending}
@@ -88,6 +92,36 @@ export function ScopeControl({ line, draft, chosen, replayed, why, locked, onArm
   );
 }
 
+/** How much of the time before the trigger has been seen, and of the capture that is under way; 0 to 1. */
+function shareOf(line: ScopeLine): number {
+  if (line.trigger_ns !== null && line.end_ns !== null) {
+    const startNs = line.trigger_ns - (line.order?.pre_s ?? 0) * 1e9;
+    return Math.min(1, (line.now_ns - startNs) / Math.max(1, line.end_ns - startNs));
+  }
+  return Math.min(
+    1,
+    (line.now_ns - (line.armed_ns ?? line.now_ns)) / Math.max(1, (line.order?.pre_s ?? 0) * 1e9),
+  );
+}
+
+function stateOf(line: ScopeLine | undefined): string {
+  if (line?.phase === "waiting" && shareOf(line) < 1) return "page.scope.state_filling";
+  return `page.scope.state_${line?.phase ?? "idle"}`;
+}
+
+function Filled({ line }: { line: ScopeLine }) {
+  const t = useTexts();
+  const percent = Math.round(100 * shareOf(line));
+  const label = t(line.phase === "capturing" ? "page.scope.share_capture" : "page.scope.share_pre", {
+    percent,
+  });
+  return (
+    <span className={classes.filled} title={label}>
+      <progress max={100} value={percent} aria-label={label} data-testid="scope-filled" />
+    </span>
+  );
+}
+
 function factsOf(line: ScopeLine, t: ReturnType<typeof useTexts>): string {
   const count = line.captures.length;
   const facts = [
@@ -97,6 +131,7 @@ function factsOf(line: ScopeLine, t: ReturnType<typeof useTexts>): string {
       : t(count === 1 ? "page.scope.state_captures_one" : "page.scope.state_captures", { count }),
     isArmed(line) ? t("page.scope.state_memory", { percent: Math.ceil(100 * line.filled) }) : "",
     line.unreadable === 0 ? "" : t("page.scope.state_unreadable", { count: line.unreadable }),
+    line.late === 0 ? "" : t("page.scope.state_late", { count: line.late }),
     line.person === "" ? "" : t("page.scope.state_by", { person: line.person }),
   ];
   return facts.filter((one) => one !== "").join(" · ");

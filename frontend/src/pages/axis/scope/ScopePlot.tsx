@@ -16,7 +16,7 @@ export const RIGHT_PX = 12;
 const BOTTOM_PX = 24;
 /** Below a plot that is not the last: its axis of time is the last one's. */
 const NARROW_PX = 8;
-const TOP_PX = 18;
+const TOP_PX = 7;
 const LINE_PX = 1.6;
 const REFERENCE_PX = 1.2;
 /** Single values are dots where they lie at least so far apart. */
@@ -83,13 +83,7 @@ export function ScopePlot({ group, view, endS, width, marks, label, last, onMade
       data-plot
       data-last={last}
       data-testid={`scope-plot-${key}`}
-    >
-      <span className={classes.unit}>
-        {group.unit === ""
-          ? t(key === BITS ? "page.scope.plot_bits" : "page.scope.plot_numbers")
-          : group.unit}
-      </span>
-    </div>
+    />
   );
 }
 

@@ -1,10 +1,19 @@
-import { type KeyboardEvent, type PointerEvent, useCallback, useEffect, useRef, useState } from "react";
+import {
+  Fragment,
+  type KeyboardEvent,
+  type PointerEvent,
+  useCallback,
+  useEffect,
+  useRef,
+  useState,
+} from "react";
 import type UPlot from "uplot";
 import type { KeptMark } from "../../../api/scope";
 import { useTexts } from "../../../texts/texts";
+import { PlotHead } from "./PlotHead";
 import classes from "./Scope.module.css";
 import { LEFT_PX, RIGHT_PX, ScopePlot } from "./ScopePlot";
-import { BITS, type PlotGroup } from "./traces";
+import { BITS, type PlotGroup, secondsText } from "./traces";
 import { moved, type Pair, within, zoomed } from "./view";
 
 const ZOOM_KEY = 0.5;
@@ -12,6 +21,7 @@ const MOVE_KEY = 0.2;
 const NEAR_PX = 7;
 const CLICK_PX = 4;
 const WHEEL = 0.0022;
+const MIDDLE = 1;
 
 interface Props {
   groups: readonly PlotGroup[];
@@ -39,8 +49,9 @@ export function ScopePlots(props: Props) {
   const area = Math.max(1, width - LEFT_PX - RIGHT_PX);
   const [box, setBox] = useState<Pair | null>(null);
   const [held, setHeld] = useState<Pair | null>(null);
-  const press = useRef<{ fromS: number; cursor: 0 | 1 | null; x: number } | null>(null);
+  const press = useRef<{ fromS: number; cursor: 0 | 1 | null; x: number; pan: Pair | null } | null>(null);
   const shown = held ?? cursors;
+  const alone = new Set(groups.flatMap(({ traces }) => traces.map((one) => one.device))).size <= 1;
   const pxOf = (atS: number) => LEFT_PX + ((atS - view[0]) / (view[1] - view[0])) * area;
   const timeOf = (event: { clientX: number }) => {
     const left = stack.current?.getBoundingClientRect().left ?? 0;
@@ -55,13 +66,16 @@ export function ScopePlots(props: Props) {
     [drawn],
   );
   const onDown = (event: PointerEvent) => {
-    if (!still || event.button !== 0) return;
+    if (!still || event.button > 1) return;
+    const pans = event.shiftKey || event.button === MIDDLE;
+    if (pans) event.preventDefault();
     const x = event.clientX - (stack.current?.getBoundingClientRect().left ?? 0);
     const near = shown?.findIndex((one) => Math.abs(pxOf(one) - x) <= NEAR_PX) ?? -1;
     press.current = {
       fromS: timeOf(event),
       cursor: near === 0 || near === 1 ? near : null,
       x: event.clientX,
+      pan: pans ? view : null,
     };
     stack.current?.setPointerCapture(event.pointerId);
   };
@@ -70,7 +84,11 @@ export function ScopePlots(props: Props) {
     const atS = timeOf(event);
     props.onHover(atS);
     if (!current) return;
-    if (current.cursor !== null && shown) setHeld(current.cursor === 0 ? [atS, shown[1]] : [shown[0], atS]);
+    if (current.pan) {
+      const share = (current.x - event.clientX) / area;
+      props.onView(moved(current.pan, whole, share) ?? null);
+    } else if (current.cursor !== null && shown)
+      setHeld(current.cursor === 0 ? [atS, shown[1]] : [shown[0], atS]);
     else if (Math.abs(event.clientX - current.x) >= CLICK_PX)
       setBox([Math.min(current.fromS, atS), Math.max(current.fromS, atS)]);
   };
@@ -118,26 +136,33 @@ export function ScopePlots(props: Props) {
       data-testid="scope-plots"
     >
       {groups.map((group, at) => (
-        <ScopePlot
-          key={group.key}
-          group={group}
-          view={view}
-          endS={endS}
-          width={width}
-          marks={marks}
-          onMade={onMade}
-          last={at === groups.length - 1}
-          label={t("page.scope.plot", {
-            signals:
-              group.key === BITS
-                ? t("page.scope.plot_bits")
-                : group.traces.map((one) => one.label).join(", "),
-          })}
-        />
+        <Fragment key={group.key}>
+          <PlotHead {...{ group, alone }} hoverS={still ? hoverS : (hoverS ?? 0)} cursors={shown} />
+          <ScopePlot
+            group={group}
+            view={view}
+            endS={endS}
+            width={width}
+            marks={marks}
+            onMade={onMade}
+            last={at === groups.length - 1}
+            label={t("page.scope.plot", {
+              signals:
+                group.key === BITS
+                  ? t("page.scope.plot_bits")
+                  : group.traces.map((one) => one.label).join(", "),
+            })}
+          />
+        </Fragment>
       ))}
       <div className={classes.over} aria-hidden>
         {box && (
           <span className={classes.box} style={{ left: pxOf(box[0]), width: pxOf(box[1]) - pxOf(box[0]) }} />
+        )}
+        {still && 0 >= view[0] && 0 <= view[1] && (
+          <span className={classes.flag} style={{ left: pxOf(0) }}>
+            <b>{t("page.scope.trigger_flag")}</b>
+          </span>
         )}
         {hoverS !== null && <span className={classes.hover} style={{ left: pxOf(hoverS) }} />}
         {shown?.map((atS, at) =>
@@ -148,6 +173,11 @@ export function ScopePlots(props: Props) {
           ),
         )}
       </div>
+      {shown && (
+        <p className={`${classes.between} bench`} data-testid="between">
+          Δt <strong>{secondsText(shown[1] - shown[0], t)} s</strong>
+        </p>
+      )}
       <p className={classes.axis}>{t(still ? "page.scope.time_axis" : "page.scope.time_axis_live")}</p>
     </div>
   );

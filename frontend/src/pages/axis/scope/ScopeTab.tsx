@@ -1,6 +1,6 @@
 import { SegmentedControl, Tabs } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
-import { useEffect, useRef, useState } from "react";
+import { type ReactNode, useEffect, useRef, useState } from "react";
 import { useTurbineQuery } from "../../../api/queries";
 import { capturesQuery, isArmed, scopeQuery, type ScopeLine } from "../../../api/scope";
 import { usePageSearch } from "../../../frame/search";
@@ -11,15 +11,15 @@ import room from "../../../ui/Room.module.css";
 import { CapturesPanel } from "./CapturesPanel";
 import { CaptureView } from "./CaptureView";
 import { type Draft, draftOf, FIRST } from "./draft";
+import { draftOfText, draftText } from "./draftText";
 import { LiveView } from "./LiveView";
-import { useOptions } from "./options";
+import { type Options, useOptions } from "./options";
 import classes from "./Scope.module.css";
 import { ScopeControl } from "./ScopeControl";
+import { type Side, Start } from "./Start";
 import { SignalsPanel } from "./SignalsPanel";
 import { TriggerPanel } from "./TriggerPanel";
 import { listOf } from "./view";
-
-type Side = "signals" | "trigger" | "captures";
 
 /** The oscilloscope: signals, trigger and captures on the left, what is seen on the right. */
 export function ScopeTab() {
@@ -34,16 +34,15 @@ export function ScopeTab() {
   const role = useRole();
   const stations = (turbine?.stations ?? []).filter((one) => one.blade !== null);
   const station = stations.find((one) => String(one.blade) === search.blade) ?? stations[0];
-  const [draft, setDraft] = useDraft(line?.order);
-  const [side, setSide] = useState<Side>(search.replay === undefined ? "signals" : "captures");
+  const draft = draftOfText(search.trigger, turbine?.slug) ?? (line?.order ? draftOf(line.order) : FIRST);
+  const setDraft = (change: Partial<Draft>) =>
+    update({ trigger: draftText(withSignal({ ...draft, ...change }, chosen, options)) });
+  const [side, setSide] = useState<Side>(replayed ? "captures" : "signals");
   const locked = replayed || !role.may("technician") || turbine === undefined;
   const chosen = chosenOf(search.channels, line?.order?.signals, turbine?.slug);
   const references = listOf(search.refs);
   useNewest(line?.captures ?? [], (capture) => update({ capture, zoom: undefined }));
-  const choose = (names: readonly string[]) =>
-    update({
-      channels: names.length === 0 ? NONE : names.map((name) => name.slice(name.indexOf("/") + 1)).join(),
-    });
+  const choose = (names: readonly string[]) => update({ channels: channelsText(names) });
   return (
     <div className={classes.scope}>
       <div className={room.strip}>
@@ -64,7 +63,11 @@ export function ScopeTab() {
           replayed={replayed}
           why={role.why("technician")}
           locked={locked}
-          onArmed={() => update({ capture: undefined, zoom: undefined, cursors: undefined })}
+          onArmed={() => {
+            // The link tells all of it from now on: elsewhere something else may have been armed last.
+            const setup = { channels: channelsText(chosen), trigger: draftText(draft) };
+            update({ ...setup, capture: undefined, zoom: undefined, cursors: undefined });
+          }}
         />
       </div>
       <div className={classes.columns}>
@@ -103,7 +106,9 @@ export function ScopeTab() {
         </aside>
         <section className={classes.main} aria-label={t("page.scope.shown")}>
           {search.capture === undefined ? (
-            <Present line={line} replayed={replayed} />
+            <Present line={line} replayed={replayed}>
+              <Start {...{ draft, options, chosen, locked, captures }} onSide={setSide} />
+            </Present>
           ) : (
             <CaptureView key={search.capture} id={search.capture} captures={captures} armed={isArmed(line)} />
           )}
@@ -113,9 +118,16 @@ export function ScopeTab() {
   );
 }
 
-function Present({ line, replayed }: { line: ScopeLine | undefined; replayed: boolean }) {
+interface PresentProps {
+  line: ScopeLine | undefined;
+  replayed: boolean;
+  /** What is shown before anything was measured. */
+  children: ReactNode;
+}
+
+function Present({ line, replayed, children }: PresentProps) {
   const t = useTexts();
-  if (!replayed) return <LiveView line={line} />;
+  if (!replayed) return <LiveView line={line}>{children}</LiveView>;
   return (
     <p className={classes.empty} data-testid="scope-replayed">
       {t("page.scope.empty_replay")}
@@ -124,6 +136,9 @@ function Present({ line, replayed }: { line: ScopeLine | undefined; replayed: bo
 }
 
 const NONE = "none";
+
+const channelsText = (names: readonly string[]) =>
+  names.length === 0 ? NONE : names.map((name) => name.slice(name.indexOf("/") + 1)).join();
 
 /** As the URL names them; where it names none, those that were armed last. */
 function chosenOf(
@@ -136,13 +151,13 @@ function chosenOf(
   return listOf(channels).map((name) => `${turbine}/${name}`);
 }
 
-/** What is typed; it begins with what was armed last, as soon as that is known. */
-function useDraft(
-  order: Parameters<typeof draftOf>[0] | null | undefined,
-): [Draft, (change: Partial<Draft>) => void] {
-  const [typed, setTyped] = useState<Draft | null>(null);
-  const draft = typed ?? (order ? draftOf(order) : FIRST);
-  return [draft, (change) => setTyped({ ...draft, ...change })];
+/** Where a trigger needs a signal and has none yet, it is the first one that fits. */
+function withSignal(draft: Draft, chosen: readonly string[], options: Options): Draft {
+  const bits = draft.kind === "event" && draft.event === "bit";
+  if (draft.kind !== "edge" && draft.kind !== "level" && !bits) return draft;
+  const fits = (name: string) => !bits || options.byName.get(name)?.bit != null;
+  if (draft.signal !== null && fits(draft.signal)) return draft;
+  return { ...draft, signal: chosen.find(fits) ?? null };
 }
 
 /** Shows a capture as it comes; those that were there before are opened by hand. */

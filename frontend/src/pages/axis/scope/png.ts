@@ -19,6 +19,8 @@ export interface Picture {
   legend: readonly { trace: Trace; text: string }[];
   /** Of the axis below the last plot. */
   axis: string;
+  /** Both cursors and what lies between them; empty without any. */
+  between: string;
   view: Pair;
   cursors: Pair | null;
 }
@@ -34,7 +36,11 @@ export function pictureOf(picture: Picture, page: HTMLElement): HTMLCanvasElemen
   const width = first.made.ctx.canvas.width / ratio + 2 * PAD;
   const heights = plots.map(({ made }) => made.ctx.canvas.height / ratio + UNIT_PX);
   const head = PAD + TITLE_PX + LINE_PX + 8;
-  const height = head + heights.reduce((sum, one) => sum + one, 0) + LINE_PX * (legend.length + 2) + PAD;
+  const height =
+    head +
+    heights.reduce((sum, one) => sum + one, 0) +
+    LINE_PX * (legend.length + (picture.between === "" ? 1 : 2)) +
+    PAD;
   const canvas = document.createElement("canvas");
   canvas.width = Math.round(width * ratio);
   canvas.height = Math.round(height * ratio);
@@ -64,6 +70,10 @@ export function pictureOf(picture: Picture, page: HTMLElement): HTMLCanvasElemen
   write(picture.axis, width / 2, top + SMALL_PX, SMALL_PX, 400, dim);
   brush.textAlign = "left";
   top += LINE_PX + 6;
+  if (picture.between !== "") {
+    write(picture.between, PAD, top + 10, SMALL_PX, 600, ink);
+    top += LINE_PX;
+  }
   for (const { trace, text } of legend) {
     brush.beginPath();
     brush.moveTo(PAD, top + 6);

@@ -8,6 +8,9 @@ export interface Trace {
   name: string;
   /** "Blade 1 PMC position actual value". */
   label: string;
+  device: string;
+  /** "Position actual value". */
+  short: string;
   unit: string;
   bit: boolean;
   /** Number of the colour, 0 to 7. */
@@ -28,6 +31,8 @@ export interface PlotGroup {
 
 export const COLOURS = 8;
 export const BITS = "bits";
+/** In the URL: each signal has an axis of its own. */
+export const EACH = "each";
 const REFERENCE_DASHES: readonly (readonly number[])[] = [
   [7, 4],
   [2, 3],
@@ -42,12 +47,16 @@ const LEAST_STEPS = 12;
 export type Described = KeptSignal | SignalRate;
 
 /** What a signal is called: device, object, bit. */
-export function labelOf(signal: Described, deviceName: (slug: string) => string, t: Translate): string {
+function labelOf(signal: Described, deviceName: (slug: string) => string, t: Translate): string {
+  return `${deviceName(signal.device)} ${shortOf(signal, t)}`;
+}
+
+function shortOf(signal: Described, t: Translate): string {
   const bit =
     signal.bit === null
       ? ""
       : `: ${signal.bit_key === null ? t("page.scope.bit", { bit: signal.bit }) : t(signal.bit_key)}`;
-  return `${deviceName(signal.device)} ${t.nameOf(signal.title)}${bit}`;
+  return `${t.nameOf(signal.title)}${bit}`;
 }
 
 export const decimalsOf = (scale: string): number =>
@@ -68,6 +77,8 @@ export function tracesOf(
       {
         name: signal.name,
         label: labelOf(signal, deviceName, t),
+        device: signal.device,
+        short: shortOf(signal, t),
         unit: signal.unit,
         bit: signal.bit !== null,
         colour: at % COLOURS,
@@ -97,13 +108,14 @@ export function referenceTraces(
   });
 }
 
-export function groupsOf(traces: readonly Trace[]): PlotGroup[] {
-  const units = [...new Set(traces.filter((one) => !one.bit).map((one) => one.unit))];
-  const groups = units.map((unit) => ({
-    key: `unit ${unit}`,
-    unit,
-    traces: traces.filter((one) => !one.bit && one.unit === unit),
-  }));
+/** `each`: a plot with its own scale for each signal; else one for all of a unit. */
+export function groupsOf(traces: readonly Trace[], each: boolean): PlotGroup[] {
+  const keyOf = (one: Trace) => (each ? `signal ${one.name}` : `unit ${one.unit}`);
+  const numbers = traces.filter((one) => !one.bit);
+  const groups = [...new Set(numbers.map(keyOf))].map((key) => {
+    const own = numbers.filter((one) => keyOf(one) === key);
+    return { key, unit: own[0]?.unit ?? "", traces: own };
+  });
   const bits = traces.filter((one) => one.bit);
   return bits.length === 0 ? groups : [...groups, { key: BITS, unit: "", traces: bits }];
 }
