@@ -247,7 +247,7 @@ def peer(sent: list[Frame], total_s: float) -> Outcome:
 
 def _listen(network: canopen.Network, node: int, scope: _Lists) -> None:
     """The mapping as the axis has it; ``canopen`` subscribes to it when it is enabled."""
-    dictionary = canopen.ObjectDictionary()
+    dictionary = canopen.ObjectDictionary()  # type: ignore[no-untyped-call]
     kinds = {0x6041: canopen.objectdictionary.UNSIGNED16, 0x6064: canopen.objectdictionary.INTEGER32}
     for index, kind in {**kinds, 0x606C: canopen.objectdictionary.INTEGER32}.items():
         variable = canopen.objectdictionary.ODVariable(f"{index:04X}", index)
