@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from bench import __main__ as command
-from bench import fc101, fleet, latency, record
+from bench import fc101, fleet, latency, record, scope
 from bench._cpu import tree_cpu_s
 from bench._load import PMC_NODES, frames, position_of
 from bench._result import Result
@@ -23,6 +23,13 @@ def test_record_loses_no_frame_of_a_calm_bus() -> None:
     assert done.ratio > 0
     assert not [shortfall for shortfall in done.shortfalls if "lost" in shortfall or "order" in shortfall]
     assert "sent 2500 frames, in our file 2500, in the peer's 2500" in done.lines
+
+
+def test_the_scope_and_its_peer_catch_the_same_and_all_of_it() -> None:
+    done = scope.measure(rounds=1, seconds=1.5)
+    assert done.ratio > 0
+    assert not done.shortfalls
+    assert "16 signals" in done.lines[0]
 
 
 def test_a_fleet_is_compared_alike_by_both(tmp_path: Path) -> None:

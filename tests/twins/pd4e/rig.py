@@ -78,7 +78,7 @@ class Client:
 
     def exchange(self, pdu: bytes) -> bytes:
         """One request and the PDU of its answer."""
-        self._transaction += 1
+        self._transaction = (self._transaction + 1) % 0x10000
         self.send(Message(self._transaction, 0, pdu).encode())
         answer = self.receive()
         assert (answer.transaction, answer.unit) == (self._transaction, 0)

@@ -41,7 +41,7 @@ export function ScopeTab() {
   const locked = replayed || !role.may("technician") || turbine === undefined;
   const chosen = chosenOf(search.channels, line?.order?.signals, turbine?.slug);
   const references = listOf(search.refs);
-  useNewest(line?.captures ?? [], (capture) => update({ capture, zoom: undefined }));
+  useNewest(line?.captures, (capture) => update({ capture, zoom: undefined }));
   const choose = (names: readonly string[]) => update({ channels: channelsText(names) });
   return (
     <div className={classes.scope}>
@@ -161,15 +161,17 @@ function withSignal(draft: Draft, chosen: readonly string[], options: Options): 
 }
 
 /** Shows a capture as it comes; those that were there before are opened by hand. */
-function useNewest(ids: readonly string[], show: (id: string) => void): void {
+function useNewest(ids: readonly string[] | undefined, show: (id: string) => void): void {
   const known = useRef<string | undefined | null>(null);
-  const newest = ids.at(-1);
+  const asked = ids !== undefined;
+  const newest = ids?.at(-1);
   const latest = useRef(show);
   useEffect(() => {
     latest.current = show;
   });
   useEffect(() => {
+    if (!asked) return;
     if (known.current !== null && newest !== undefined && newest !== known.current) latest.current(newest);
     known.current = newest;
-  }, [newest]);
+  }, [asked, newest]);
 }
