@@ -236,7 +236,7 @@ class ModbusDevice:
             name=self.name(address),
             sent=data.hex(),
             found=None if found is None else found.hex(),
-            reason="outcome unknown" if found is None or verify is not Verify.EQUAL else "differs",
+            reason_key=f"unverified.{'unknown' if found is None or verify is not Verify.EQUAL else 'other_value'}",
         )
 
     async def _written(self, answer: Answer, address: Address, urgent: bool) -> Written:

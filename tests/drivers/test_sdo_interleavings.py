@@ -138,7 +138,8 @@ def check_write(story: Story, value: int, outcome: Outcome, sure: bool) -> None:
         assert value in story.refused
     else:
         assert isinstance(outcome.error, NoAnswerError | UnverifiedError)
-        if isinstance(outcome.error, UnverifiedError) and outcome.error.details["reason"] == "differs" and sure:
+        differs = "unverified.other_value"
+        if isinstance(outcome.error, UnverifiedError) and outcome.error.details["reason_key"] == differs and sure:
             assert value not in story.executed
 
 
