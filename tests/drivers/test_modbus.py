@@ -201,7 +201,7 @@ async def test_what_cannot_be_verified_by_reading_is_told_so() -> None:
     async with small(Silent(None, done=True)) as (driver, _):
         with pytest.raises(UnverifiedError) as caught:
             await driver.write(1, WINDOW, FOUR, timeout_s=0.05, verify=Verify.ACK)
-        assert caught.value.details["reason"] == "outcome unknown"
+        assert caught.value.details["reason_key"] == "unverified.unknown"
 
 
 async def test_a_write_whose_connection_ends_is_unknown_and_not_repeated() -> None:
