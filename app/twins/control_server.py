@@ -23,12 +23,10 @@ first line that is no request, and at a wrong token, the connection is dropped.
 
 from __future__ import annotations
 
-import contextlib
 import hmac
 import json
 import logging
 import socket
-import threading
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Final
@@ -37,6 +35,7 @@ from app.errors import HubsideError, UsageError
 from app.model.fault import CATALOGUE, active_table, kind_table, order_from_table
 from app.twins.faults import Instructor
 from app.twins.line_thread import LineThread
+from app.twins.paced_server import PacedServer
 from app.twins.scenario import MAX_BYTES, Scenario, load_scenario, read_scenario
 
 _LOG: Final = logging.getLogger(__name__)
@@ -58,49 +57,22 @@ _KEYS: Final = {
 }
 
 
-class ControlServer:
-    """The server. ``scenarios``: folder of those that can be played by name; ``problems`` says which cannot be read.
-
-    ``start`` and ``stop`` may be called from any thread, ``stop`` also after the line's thread has ended.
-    """
+class ControlServer(PacedServer["_Client"]):
+    """The server. ``scenarios``: folder of those that can be played by name; ``problems`` says which cannot be read."""
 
     def __init__(
         self, thread: LineThread, instructor: Instructor, token: str, scenarios: Path | None = None, port: int = 0
     ) -> None:
+        super().__init__(thread, HOST, port, _CLIENTS_MAX)
         self.problems: list[str] = []
         self._thread = thread
         self._token = token.encode()
         self._desk = _Desk(thread, instructor, self._load(scenarios))
-        self._clients: set[_Client] = set()
-        self._closed = threading.Event()
-        self._listener = socket.create_server((HOST, port), backlog=_CLIENTS_MAX)
-        self._listener.setblocking(False)
-        self.port: int = self._listener.getsockname()[1]
 
     @property
     def address(self) -> str:
         """Where it listens: ``HOST:PORT``."""
         return f"{HOST}:{self.port}"
-
-    def start(self) -> None:
-        """Begin to accept clients."""
-        self._thread.call_soon(lambda: self._thread.on_readable(self._listener, self._accept))
-
-    def stop(self, timeout_s: float = 5.0) -> None:
-        """Close all connections. Raises TimeoutError where the line's thread does not do it in time."""
-        if not self._thread.is_alive():
-            self._close()
-            return
-        self._thread.call_soon(self._close)
-        if not self._closed.wait(timeout_s):
-            raise TimeoutError(f"the control server did not stop within {timeout_s} s")
-
-    def __enter__(self) -> ControlServer:
-        self.start()
-        return self
-
-    def __exit__(self, *_exc: object) -> None:
-        self.stop()
 
     def knows(self, token: object) -> bool:
         """Whether it is the secret; takes the same time for every wrong one."""
@@ -134,24 +106,8 @@ class ControlServer:
                 self.problems.append(str(error.details["reason"]))
         return found
 
-    def _accept(self) -> None:
-        with contextlib.suppress(BlockingIOError, ConnectionAbortedError):
-            sock, _ = self._listener.accept()
-            if len(self._clients) >= _CLIENTS_MAX:
-                sock.close()
-                return
-            sock.setblocking(False)
-            sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            self._clients.add(_Client(self, self._thread, sock))
-
-    def _close(self) -> None:
-        if self._closed.is_set():
-            return
-        self._thread.on_readable(self._listener, None)
-        self._listener.close()
-        for client in tuple(self._clients):
-            client.close()
-        self._closed.set()
+    def _connected(self, sock: socket.socket, _peer: str) -> _Client:
+        return _Client(self, self._thread, sock)
 
 
 class _Client:

@@ -27,10 +27,8 @@ taken as one.
 
 from __future__ import annotations
 
-import contextlib
 import logging
 import socket
-import threading
 import time
 from collections.abc import Callable
 from enum import Enum
@@ -38,6 +36,7 @@ from typing import Final
 
 from app.twins.line import Port, TxOrder
 from app.twins.line_thread import LineThread
+from app.twins.paced_server import PacedServer
 from app.wire.frame import Can
 
 _LOG: Final = logging.getLogger(__name__)
@@ -62,13 +61,11 @@ class _Mode(Enum):
     RAW = "raw"
 
 
-class SocketcandServer:
+class SocketcandServer(PacedServer["_Client"]):
     """The server.
 
     ``port`` 0 takes a free one; ``wall_ns`` is the clock for the time stamps of frames; a client with
     more than ``out_limit_bytes`` unread is dropped, and the line never waits.
-
-    ``start`` and ``stop`` may be called from any thread, ``stop`` also after the line's thread has ended.
     """
 
     def __init__(
@@ -80,66 +77,26 @@ class SocketcandServer:
         wall_ns: Callable[[], int] = time.time_ns,
         out_limit_bytes: int = _OUT_LIMIT_BYTES,
     ) -> None:
+        super().__init__(thread, host, port, _CLIENTS_MAX)
         self.channel = channel
         self.out_limit_bytes = out_limit_bytes
         self.dropped_clients = 0
         """Clients that were dropped because they did not read."""
         self._thread = thread
         self._wall_offset_ns = wall_ns() - thread.monotonic_ns()
-        self._clients: set[_Client] = set()
         self._formatted: tuple[int, Can, bytes] = (0, Can(0), b"")
-        self._closed = threading.Event()
-        self._listener = socket.create_server((host, port), backlog=16)
-        self._listener.setblocking(False)
-        self.host, self.port = self._listener.getsockname()[:2]
-
-    def start(self) -> None:
-        """Begin to accept clients."""
-        self._thread.call_soon(self._open)
-
-    def stop(self, timeout_s: float = 5.0) -> None:
-        """Close all connections. Raises TimeoutError where the line's thread does not do it in time."""
-        if not self._thread.is_alive():
-            self._close()
-            return
-        self._thread.call_soon(self._close)
-        if not self._closed.wait(timeout_s):
-            raise TimeoutError(f"the server did not stop within {timeout_s} s")
-
-    def __enter__(self) -> SocketcandServer:
-        self.start()
-        return self
-
-    def __exit__(self, *_exc: object) -> None:
-        self.stop()
 
     # -- on the line's thread --------------------------------------------------------
 
-    def _open(self) -> None:
-        self._thread.on_readable(self._listener, self._accept)
+    def _opened(self) -> None:
         self._thread.after_step(self._flush)
 
-    def _close(self) -> None:
-        if self._closed.is_set():
-            return
-        self._thread.on_readable(self._listener, None)
+    def _closing(self) -> None:
         self._thread.forget(self._flush)
-        self._listener.close()
-        for client in tuple(self._clients):
-            client.close()
-        self._closed.set()
 
-    def _accept(self) -> None:
-        with contextlib.suppress(BlockingIOError, ConnectionAbortedError):
-            sock, peer = self._listener.accept()
-            if len(self._clients) >= _CLIENTS_MAX:
-                _LOG.warning("socketcand client %s refused: there are %d already", peer[0], len(self._clients))
-                sock.close()
-                return
-            sock.setblocking(False)
-            sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SYSTEM_BUFFER_BYTES)
-            self._clients.add(_Client(self, self._thread, sock, f"{peer[0]}:{peer[1]}"))
+    def _connected(self, sock: socket.socket, peer: str) -> _Client:
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SYSTEM_BUFFER_BYTES)
+        return _Client(self, self._thread, sock, peer)
 
     def _flush(self) -> None:
         for client in tuple(self._clients):

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Mapping
 from contextlib import asynccontextmanager
 
 from app.drivers.modbus_config import ModbusPeer
 from app.model.address import Address
-from app.model.datatypes import Raw, encode_raw
+from app.model.datatypes import DataType, Raw, encode_raw
 from app.model.description import Description
 from app.model.description_file import load_builtin
 from app.wire.modbus.adu import AduSplitter, Message, decode_adu
@@ -205,8 +205,8 @@ class Dictionary:
         self.written.append((address, data))
         self.objects[address] = data
 
-    def _cut(self, addresses: object) -> list[tuple[ObjectFrame, ...]]:
-        wanted = set(addresses)  # type: ignore[call-overload]
+    def _cut(self, addresses: Iterable[Address]) -> list[tuple[ObjectFrame, ...]]:
+        wanted = set(addresses)
         frames = [ObjectFrame(a, self.objects[a]) for a in sorted(self.objects, key=lambda a: a[:2]) if a in wanted]
         if not frames:
             raise _AbortedError(Abort.NO_OBJECT)
@@ -250,11 +250,11 @@ def _no_register(request: Request) -> ExceptionAnswer:
     return ExceptionAnswer(request.function, ModbusException.ILLEGAL_ADDRESS)
 
 
-def _default(default: Raw | None, data_type: object) -> bytes:
-    size = data_type.size  # type: ignore[attr-defined]
+def _default(default: Raw | None, data_type: DataType) -> bytes:
+    size = data_type.size
     if default is None:
         return b"" if size is None else bytes(size)
-    return encode_raw(data_type, default)  # type: ignore[arg-type]
+    return encode_raw(data_type, default)
 
 
 @asynccontextmanager

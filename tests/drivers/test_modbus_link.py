@@ -6,6 +6,7 @@ import asyncio
 import struct
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
+from typing import Any
 
 import pytest
 from hypothesis import given, settings
@@ -153,9 +154,9 @@ async def test_one_at_a_time() -> None:
         assert await second == ObjectWritten(WRITE.address)
 
 
-def changed(**fields: object) -> Callable[[Message], bytes]:
+def changed(**fields: Any) -> Callable[[Message], bytes]:
     def change(message: Message) -> bytes:
-        return message._replace(**fields).encode()  # type: ignore[arg-type]
+        return message._replace(**fields).encode()
 
     return change
 

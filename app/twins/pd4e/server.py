@@ -7,12 +7,11 @@ of the device ends all connections, and none is taken until it has booted.
 
 from __future__ import annotations
 
-import contextlib
 import logging
 import socket
-import threading
 from typing import Final
 
+from app.twins.paced_server import PacedServer
 from app.twins.paced_thread import PacedThread
 from app.twins.pd4e.device import Pd4e
 from app.twins.pd4e.requests import Answering
@@ -27,41 +26,14 @@ _OUT_LIMIT_BYTES: Final = 1 << 18
 _CLIENTS_MAX: Final = 16
 
 
-class Pd4eServer:
-    """The server of one device. ``port`` 0 takes a free one. Raises OSError where the address cannot be had.
-
-    ``start`` and ``stop`` may be called from any thread, ``stop`` also after the device's thread has ended.
-    """
+class Pd4eServer(PacedServer["_Client"]):
+    """The server of one device. ``port`` 0 takes a free one. Raises OSError where the address cannot be had."""
 
     def __init__(self, thread: PacedThread, device: Pd4e, host: str = "127.0.0.1", port: int = PORT) -> None:
+        super().__init__(thread, host, port, _CLIENTS_MAX)
         self._thread = thread
         self._device = device
-        self._clients: set[_Client] = set()
-        self._closed = threading.Event()
-        self._listener = socket.create_server((host, port), backlog=16)
-        self._listener.setblocking(False)
-        self.host, self.port = self._listener.getsockname()[:2]
         device.on_restart = self._end_all
-
-    def start(self) -> None:
-        """Begin to accept clients."""
-        self._thread.call_soon(lambda: self._thread.on_readable(self._listener, self._accept))
-
-    def stop(self, timeout_s: float = 5.0) -> None:
-        """Close all connections. Raises TimeoutError where the thread does not do it in time."""
-        if not self._thread.is_alive():
-            self._close()
-            return
-        self._thread.call_soon(self._close)
-        if not self._closed.wait(timeout_s):
-            raise TimeoutError(f"the server did not stop within {timeout_s} s")
-
-    def __enter__(self) -> Pd4eServer:
-        self.start()
-        return self
-
-    def __exit__(self, *_exc: object) -> None:
-        self.stop()
 
     # -- on the device's thread --------------------------------------------------------
 
@@ -81,29 +53,13 @@ class Pd4eServer:
         """A client has closed."""
         self._clients.discard(client)
 
-    def _accept(self) -> None:
-        with contextlib.suppress(BlockingIOError, ConnectionAbortedError):
-            sock, _ = self._listener.accept()
-            self._thread.catch_up()
-            if len(self._clients) >= _CLIENTS_MAX or not self._device.online:
-                sock.close()
-                return
-            sock.setblocking(False)
-            sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            self._clients.add(_Client(self, self._thread, sock))
+    def _connected(self, sock: socket.socket, _peer: str) -> _Client | None:
+        self._thread.catch_up()
+        return _Client(self, self._thread, sock) if self._device.online else None
 
     def _end_all(self) -> None:
         for client in tuple(self._clients):
             client.end()
-
-    def _close(self) -> None:
-        if self._closed.is_set():
-            return
-        self._thread.on_readable(self._listener, None)
-        self._listener.close()
-        for client in tuple(self._clients):
-            client.close()
-        self._closed.set()
 
 
 class _Client:

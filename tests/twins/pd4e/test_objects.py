@@ -11,7 +11,7 @@ from app.model.address import Address
 from app.model.description_file import load_builtin
 from app.model.variant import as_variant
 from app.twins.pd4e.device import MOTORS
-from app.wire.modbus.answers import FramesRead, ObjectWritten
+from app.wire.modbus.answers import FramesRead, ObjectRead, ObjectWritten
 from app.wire.modbus.frames import ObjectFrame
 from app.wire.modbus.functions import Phase
 from app.wire.modbus.requests import ReadArray, ReadDictionary, ReadObject, Request, WriteArray, WriteObject
@@ -85,7 +85,8 @@ def test_texts_are_read_whole_or_in_pieces(client: Client) -> None:
     name = client.text("1008")
     assert name == "HUBSIDE TWIN PD4-E591L42-E-65-4"
     piece = client.ask(ReadObject(Address(0x1008), 4, start=8))
-    assert piece.data == b"TWIN"  # type: ignore[union-attr]
+    assert isinstance(piece, ObjectRead)
+    assert piece.data == b"TWIN"
     assert client.text("4040") == "TWIN-0001"
     assert len(client.text("200F")) == 17
 

@@ -105,7 +105,9 @@ def test_a_target_in_the_same_message_as_bit_4_is_the_one_that_counts(client: Cl
 def test_fc_23_writes_before_it_reads(client: Client) -> None:
     answer = client.ask(ReadWriteRegisters(RX, 2, RX, (0x0006, 0x0003)))
     assert answer == RegistersRead((0x0006, 0x0003), Function.READ_WRITE_REGISTERS)
-    assert client.ask(ReadWriteRegisters(TX, 2, RX, (0x0006,))).registers[1] == 3  # type: ignore[union-attr]
+    answer = client.ask(ReadWriteRegisters(TX, 2, RX, (0x0006,)))
+    assert isinstance(answer, RegistersRead)
+    assert answer.registers[1] == 3
 
 
 def test_one_half_of_a_32_bit_object_can_be_written(client: Client) -> None:

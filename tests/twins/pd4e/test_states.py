@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import pytest
 
 from tests.twins.pd4e.rig import Client, Rig
@@ -169,5 +171,5 @@ def test_mode_shows_in_6061_and_unknown_ones_are_refused(client: Client) -> None
         client.write("6060", mode)
         assert client.read("6061") == mode
     for mode in (5, 11, -3, 127):
-        assert client.refused(lambda mode=mode: client.write("6060", mode)) == 0x06090030  # type: ignore[misc]
+        assert client.refused(partial(client.write, "6060", mode)) == 0x06090030
     assert client.read("6061") == 10
