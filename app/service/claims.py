@@ -2,8 +2,9 @@
 
 A change of PDOs and a restore want a device for themselves: neither begins while anything else is under way there, and
 while one is, nothing else is written, saved or restarted (``service.gate``). A batch of writes and a battery test only
-keep these two away. STOP, FEATHER and reading never ask. Claims are taken and given back in the event loop without
-waiting in between, so that of two that begin at once one is refused before it has sent anything.
+keep these two away. A single write, a save or a restart holds no claim: it only asks whether somebody has the device
+for himself. STOP, FEATHER and reading never ask. Claims are taken and given back in the event loop without waiting in
+between, so that of two that begin at once one is refused before it has sent anything.
 """
 
 from __future__ import annotations

@@ -168,6 +168,8 @@ async def _write_all(
     """
     unclear: set[str] = set()
     waiting = [(change, row) for change, row in rows if row.state is RowState.WAITING]
+    if len(waiting) < len(rows):  # those that are refused already do not come before the rest
+        waiting = _anew(job, waiting, known)
     while waiting:
         change, row = waiting.pop(0)
         is_clear = await whole(_write_clearly(change, row, order.allow, known, journal))
@@ -180,10 +182,15 @@ async def _write_all(
         if ends:
             return None
         if row.error is not None:
-            waiting = _in_order([one for one in waiting if one[1].state is RowState.WAITING], known)
-            job.done += sum(one.state is RowState.REFUSED for _, one in waiting)
-            waiting = [(change, one) for change, one in waiting if one.state is RowState.WAITING]
+            waiting = _anew(job, [one for one in waiting if one[1].state is RowState.WAITING], known)
     return frozenset(unclear)
+
+
+def _anew(job: Job, waiting: Sequence[Row], known: KnownDevices) -> list[Row]:
+    """What waits, in an order for it alone; those for which there is none are refused."""
+    ordered = _in_order(waiting, known)
+    job.done += sum(row.state is RowState.REFUSED for _, row in ordered)
+    return [(change, row) for change, row in ordered if row.state is RowState.WAITING]
 
 
 def _is_of(row: Row, station: str) -> bool:

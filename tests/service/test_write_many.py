@@ -11,6 +11,7 @@ import pytest
 from app.errors import (
     BusLostError,
     ConflictError,
+    DeviceBusyError,
     HubsideError,
     LimitError,
     NoAnswerError,
@@ -21,6 +22,7 @@ from app.errors import (
 )
 from app.model.address import Address
 from app.model.checks import Allow
+from app.service.claims import Work
 from app.service.connection import Connection
 from app.service.jobs import Job, Jobs, JobState, RowState
 from app.service.journal import Entry, Kind
@@ -121,6 +123,21 @@ async def test_one_wrong_row_keeps_all_from_being_sent(connection: Connection) -
     assert Kind.WRITTEN not in [entry.kind for entry in connection.journal.latest()]
     job = await run(connection, order(wrong, save=True, on_failure=OnFailure.GO_ON))
     assert states(job) == [RowState.SAVED, RowState.REFUSED]
+
+
+async def test_a_row_whose_order_rested_on_a_refused_one_is_not_written(connection: Connection) -> None:
+    """The PMC's minimum may pass the battery's voltage only once that has more blocs; the PMM is in use."""
+    blocs, minimum = Address(0x3020, 4), Address(0x6510, 4)
+    target = connection.target(PMC)
+    before = await connection.driver(target).read(target.node, minimum)
+    raised = int.from_bytes(before, "little") * 5 // 2
+    rows = [change(connection, PMMS[0], blocs, 8), change(connection, PMC, minimum, raised)]
+    with connection.gate.claims.held(Work.PDOS, "Anna", (PMMS[0],)):
+        job = await run(connection, order(rows, on_failure=OnFailure.GO_ON))
+    assert job.done == 2
+    assert {row.address: type(row.error) for row in job.rows} == {"3020:04": DeviceBusyError, "6510:04": OrderError}
+    assert await connection.driver(target).read(target.node, minimum) == before
+    assert states(await run(connection, order(rows))) == [RowState.VERIFIED] * 2
 
 
 async def test_a_refusal_by_the_device_stops_the_rest_and_the_save(connection: Connection) -> None:

@@ -96,11 +96,12 @@ class BatteryDesk:
             driver = self._connection.driver(target)
             before = await figures(driver, target)
             sequence = Sequence(driver, target, journal)
-            claim = ExitStack()
-            claim.enter_context(self._claimed(target, person))
-            journal.note(Kind.BATTERY_TEST_BEGUN, slug)
-            task = asyncio.create_task(self._run(target, person, sequence, before, journal))
-            task.add_done_callback(lambda _task: claim.close())
+            with ExitStack() as claim:
+                claim.enter_context(self._claimed(target, person))
+                journal.note(Kind.BATTERY_TEST_BEGUN, slug)
+                task = asyncio.create_task(self._run(target, person, sequence, before, journal))
+                kept = claim.pop_all()
+            task.add_done_callback(lambda _task: kept.close())
             running = self._running[slug] = Running(person, self._connection.stamper(), before, sequence, task)
         finally:
             self._beginning.discard(slug)

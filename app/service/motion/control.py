@@ -7,7 +7,7 @@ FEATHER first of all: then nothing is sent any more (OvertakenError).
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Collection
+from collections.abc import Awaitable, Callable, Collection
 from enum import IntEnum
 from typing import Any, Final
 
@@ -18,6 +18,7 @@ from app.model.description import Verify
 from app.model.values import to_scaled
 from app.service.devices import Target, decode
 from app.service.motion.interlocks import POSITION
+from app.service.motion.left import ModeChanged
 from app.service.stop import CONTROLWORD, STATUSWORD
 
 MODE: Final = Address(0x6060)
@@ -71,13 +72,22 @@ class AxisMode(IntEnum):
 class Control:
     """Commands to one axis. ``send`` puts the controlword into RPDO1; False: no such PDO is in force.
 
+    ``before_mode`` hears of every mode before it is set.
+
     ``own`` begins a command; what else commands the axis after it ends the command.
     """
 
-    def __init__(self, driver: Any, target: Target, send: Callable[[bytes], bool]) -> None:
+    def __init__(
+        self,
+        driver: Any,
+        target: Target,
+        send: Callable[[bytes], bool],
+        before_mode: Callable[[int], Awaitable[None]],
+    ) -> None:
         self.driver = driver
         self.target = target
         self._send = send
+        self._before_mode = before_mode
         self._known = 0
         self._sent = self._ended = self._released = False
 
@@ -268,6 +278,7 @@ class Control:
         await self.switch_off()
         self.word(Word.SHUTDOWN)
         await self._until_heard()
+        await self._before_mode(mode)
         self.require_own()
         await self.driver.write(self.target.node, MODE, mode.to_bytes(1, "little"), verify=Verify.ACK)
         found = await self.number(MODE_SHOWN)
@@ -276,15 +287,18 @@ class Control:
                 address=MODE.short, name="mode", sent=str(int(mode)), found=str(found), reason_key="unverified.mode"
             )
 
-    async def mode_back(self, mode: int) -> bool:
+    async def mode_back(self, changed: ModeChanged) -> bool:
         """Give an axis without power the mode that it had; one that had none gets one that goes nowhere by itself.
 
-        False where that must wait: an EFC is in force, or the axis does not listen. Raises OvertakenError where
-        somebody commands it meanwhile, and what a write raises.
+        One that is not in the mode that was set last is left as it is: somebody else has it. False where it must wait:
+        an EFC is in force, or the axis does not listen. For a Control of its own: whoever else is about to command the
+        axis is overtaken by what is sent here. Raises OvertakenError where somebody commands it meanwhile, and what a
+        write raises.
         """
-        mode = mode or AxisMode.PROFILE_POSITION
         self.own()  # before the look: a FEATHER that comes after it is not ended by what is sent here
-        if await self.number(MODE_SHOWN) == mode:
+        mode = changed.was or AxisMode.PROFILE_POSITION
+        shown = await self.number(MODE_SHOWN)
+        if shown == mode or shown != changed.now:
             return True
         word = await self.number(CONTROLWORD)
         if word & _EFC or not await self.status() & REMOTE or await self.state() in ENERGISED:

@@ -424,12 +424,13 @@ class MotionDesk:
         try:
             if axis is not None:
                 await self._put_back(axis, journal)
+            elif interlocks.others_at_work(self.connection, control.target):
+                await self.left.forget_mode(slug)  # who has the node since then needs both as they are
+                await preparation.put_back(control, self.left, journal)
+                await self.left.forget_nmt(slug)
             else:
                 await preparation.put_back(control, self.left, journal)
-                if interlocks.others_at_work(self.connection, control.target):
-                    await self.left.forget_nmt(slug)  # who started the node since then needs it so
-                else:
-                    await preparation.give_nmt_back(control, self.left, journal)
+                await preparation.give_nmt_back(control, self.left, journal)
         finally:
             if self.running is running:
                 self.running = None
@@ -440,7 +441,8 @@ class MotionDesk:
         async with self._changing:
             if self.prepared.get(axis.slug) is not axis:
                 return
-            await preparation.put_back(axis.control, self.left, journal)
+            # By a control of its own: a STOP that an order which waits for this would see stays one for it.
+            await preparation.put_back(self._control(axis.control.target), self.left, journal)
             heartbeat.forget(axis.slug)
             await preparation.give_nmt_back(axis.control, self.left, journal)
             self.prepared.pop(axis.slug, None)
@@ -611,7 +613,12 @@ class MotionDesk:
 
     def _control(self, target: Target) -> Control:
         link = self.connection.buses[target.device.bus]
-        return Control(link.driver, target, lambda data: link.send_pdo(target.node, CONTROLWORD, data))
+        return Control(
+            link.driver,
+            target,
+            lambda data: link.send_pdo(target.node, CONTROLWORD, data),
+            lambda mode: self.left.note_mode_set(target.slug, mode),
+        )
 
 
 def _tell_failure(ticker: asyncio.Task[None]) -> None:

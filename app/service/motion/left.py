@@ -23,11 +23,18 @@ class Changed(NamedTuple):
     now: bytes
 
 
+class ModeChanged(NamedTuple):
+    """The mode of operation (6061h) of an axis before it was prepared, and the one that was set last."""
+
+    was: int
+    now: int
+
+
 @dataclass
 class _Found:
     objects: dict[Address, Changed] = field(default_factory=dict)
     nmt: NmtState | None = None
-    mode: int | None = None
+    mode: ModeChanged | None = None
 
 
 class Left:
@@ -53,8 +60,8 @@ class Left:
         found = self._found.get(device)
         return None if found is None else found.nmt
 
-    def mode_of(self, device: str) -> int | None:
-        """The mode of operation (6061h) that the axis had before it was prepared; None where it has it again."""
+    def mode_of(self, device: str) -> ModeChanged | None:
+        """The mode of the axis before it was prepared, and now; None where it has its own again."""
         found = self._found.get(device)
         return None if found is None else found.mode
 
@@ -72,10 +79,22 @@ class Left:
         await self._keep()
 
     async def note_mode(self, device: str, mode: int) -> None:
-        """The mode is about to be changed; it was ``mode``. The first one counts. Raises StoreError."""
+        """The axis is about to be prepared and is in ``mode``. Raises StoreError.
+
+        What an earlier preparation noted counts as long as its mode stands: another one is of somebody else, or of the
+        time after a restart.
+        """
         found = self._found.setdefault(device, _Found())
-        found.mode = mode if found.mode is None else found.mode
-        await self._keep()
+        if found.mode is None or found.mode.now != mode:
+            found.mode = ModeChanged(mode, mode)
+            await self._keep()
+
+    async def note_mode_set(self, device: str, mode: int) -> None:
+        """The mode of an axis that is being prepared, or is, is about to be set. Raises StoreError."""
+        found = self._found.get(device)
+        if found is not None and found.mode is not None:
+            found.mode = ModeChanged(found.mode.was, mode)
+            await self._keep()
 
     async def forget(self, device: str, address: Address) -> None:
         """It holds again what it held. Raises StoreError."""
@@ -121,7 +140,7 @@ def _read(document: Any) -> dict[str, _Found]:
                 for text, was, now in found["objects"]
             },
             None if found["nmt"] is None else NmtState[found["nmt"]],
-            found.get("mode"),
+            None if found.get("mode") is None else ModeChanged(*found["mode"]),
         )
         for device, found in document.items()
     }

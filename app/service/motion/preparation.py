@@ -217,12 +217,12 @@ async def put_back(control: Control, left: Left, journal: Journal) -> None:
 async def _mode_back(control: Control, left: Left) -> None:
     """The axis gets its mode back; where that cannot be now, it stays noted. Raises StoreError."""
     slug = control.target.slug
-    mode = left.mode_of(slug)
+    changed = left.mode_of(slug)
     try:
-        if mode is not None and await control.mode_back(mode):
+        if changed is not None and await control.mode_back(changed):
             await left.forget_mode(slug)
     except (AxisStateError, DeviceError, NoAnswerError, OvertakenError) as error:
-        log.warning("%s: mode %s is not put back: %s", slug, mode, error.code)
+        log.warning("%s: its mode is not put back: %s", slug, error.code)
 
 
 async def give_nmt_back(control: Control, left: Left, journal: Journal) -> None:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -32,6 +31,7 @@ from app.service.devices import Target, decode
 from app.service.jobs import Job, JobRow, RowState
 from app.service.journal import Journal, Kind
 from app.service.pdo.kept import Kept, PdoChange, Stand
+from app.service.whole import ended
 from app.service.write import write_raw
 
 
@@ -110,7 +110,7 @@ class Carrying:
             await asyncio.shield(task)
         except asyncio.CancelledError:
             self.cancelled = True
-            await _whole(task)
+            await ended(task)
             if isinstance(error := task.exception(), PdoBrokenError):
                 raise error from None  # what is left half-made must be told
             raise
@@ -175,10 +175,3 @@ class Carrying:
 
     def _told(self) -> dict[str, str]:
         return {"pdos": ", ".join(str(pdo) for pdo in self.change.after)}
-
-
-async def _whole(task: asyncio.Task[None]) -> None:
-    """Wait for its end, however often the job is cancelled meanwhile: it writes until then."""
-    while not task.done():
-        with suppress(asyncio.CancelledError):
-            await asyncio.wait([task])

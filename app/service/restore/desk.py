@@ -250,9 +250,10 @@ class Desk:
         if len(targets) != len(slugs):
             raise UsageError(reason=f"not all devices of the restore are there: {', '.join(sorted(slugs))}")
         require_same_places(connection, kept, targets)
-        claim = _claimed(connection, targets, person)
-        self._journal.by(person).note(kind, None, station=kept.row.station, restore=restore_id)
-        return kept, self._transaction(connection, kept, person, targets, commands), claim
+        with _claimed(connection, targets, person) as claim:
+            self._journal.by(person).note(kind, None, station=kept.row.station, restore=restore_id)
+            transaction = self._transaction(connection, kept, person, targets, commands)
+            return kept, transaction, claim.pop_all()
 
     def _wrong_state(self, row: RestoreRow) -> RestoreStateError:
         return RestoreStateError(restore=row.id, station=row.station, state_key=row.state.text_key)

@@ -209,11 +209,14 @@ class ScopeDesk:
             return
         if not run.over:
             stop_ns = self.now_ns()
-            if run.engine.window is not None:
-                await self._let_in(run, stop_ns)
-            if not run.over:  # it may have come to its end meanwhile
-                self._keep_all(run, run.engine.stop(stop_ns, why))
-                self._release(run)
+            try:
+                if run.engine.window is not None:
+                    await self._let_in(run, stop_ns)
+                if not run.over:  # it may have come to its end meanwhile
+                    self._keep_all(run, run.engine.stop(stop_ns, why))
+            finally:
+                if not run.over:
+                    self._release(run)
         if run.ticker is not None:
             run.ticker.cancel()
             await asyncio.gather(run.ticker, return_exceptions=True)

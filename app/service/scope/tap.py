@@ -106,9 +106,10 @@ class Tap:
         Frames of a bus are told in their order, so what a bus told last vouches for what came before, and for
         ``settle_ns`` after it.
         """
+        # What was heard first: what comes between both looks waits then, and is not vouched for.
+        heard = [t_ns + settle_ns for t_ns in tuple(self.heard_ns.values()) if now_ns - t_ns < SILENT_NS]
         with self._lock:
             waiting = [self._queue[0].t_ns] if self._queue else []
-        heard = [t_ns + settle_ns for t_ns in tuple(self.heard_ns.values()) if now_ns - t_ns < SILENT_NS]
         return min((now_ns, *waiting, *heard))
 
     async def drain(self) -> None:

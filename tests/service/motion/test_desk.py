@@ -245,9 +245,11 @@ async def test_a_clock_that_is_set_changes_nothing(connection: Connection, monke
         assert desk.last.why is Ended.SILENT
 
 
-@pytest.mark.parametrize(("had", "gets"), [(6, 6), (0, 1)])
-async def test_what_a_killed_server_left_is_put_back_by_the_next(connection: Connection, had: int, gets: int) -> None:
-    """The mode too; an axis that had none yet is left in one that goes nowhere by itself."""
+@pytest.mark.parametrize(("had", "set_since", "gets"), [(6, None, 6), (0, None, 1), (6, 8, 8)])
+async def test_what_a_killed_server_left_is_put_back_by_the_next(
+    connection: Connection, had: int, set_since: int | None, gets: int
+) -> None:
+    """The mode too, but not where somebody has set another one since; who had none gets one that goes nowhere."""
     left = Left()
     target = connection.target(AXIS)
     await connection.driver(target).write(target.node, Address(0x6060), bytes([had]))
@@ -264,6 +266,8 @@ async def test_what_a_killed_server_left_is_put_back_by_the_next(connection: Con
     assert (await number(connection, ABORT), await number(connection, WATCH)) != before
     after = MotionDesk(connection, connection.journal, left)
     assert motion_line(after).left == (AXIS,)
+    if set_since is not None:
+        await connection.driver(target).write(target.node, Address(0x6060), bytes([set_since]))
     fence = after.take_lease("tester", "next").fence
     await after.put_back(AXIS, fence)
     assert (await number(connection, ABORT), await number(connection, WATCH)) == before
@@ -271,6 +275,17 @@ async def test_what_a_killed_server_left_is_put_back_by_the_next(connection: Con
     await until(lambda: nmt_state(connection) is NmtState.PRE_OPERATIONAL)
     assert motion_line(after).left == ()
     await after.close()
+
+
+async def test_what_is_put_back_hides_no_stop_from_an_order_that_waits_for_it(connection: Connection) -> None:
+    async with at_the_desk(connection) as (desk, page):
+        page.hold()
+        prepared = await desk.prepare(AXIS, page.fence)
+        prepared.control.own()  # as an order does that waits for its turn
+        await command_all(connection.axes(), Command.STOP, connection.journal, connection.stamper)
+        await desk.put_back(AXIS, page.fence)
+        with pytest.raises(OvertakenError):
+            prepared.control.require_own()
 
 
 async def test_nothing_moves_without_lease_interlocks_and_proof(connection: Connection) -> None:

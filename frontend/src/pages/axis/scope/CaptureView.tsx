@@ -8,6 +8,7 @@ import {
   IconZoomOut,
   IconZoomReset,
 } from "@tabler/icons-react";
+import { useDebouncedValue } from "@mantine/hooks";
 import { useQueries, useQuery } from "@tanstack/react-query";
 import { useMemo, useRef, useState } from "react";
 import type UPlot from "uplot";
@@ -49,6 +50,7 @@ import { listOf, type Pair, pairText, parsePair, within, zoomed, zoomOf } from "
 import { XyView } from "./XyView";
 
 const POINTS = 2000;
+const SETTLES_MS = 150;
 const ZOOM = 0.5;
 const VIEWS = ["time", "fft", "xy"] as const;
 
@@ -217,11 +219,12 @@ function useTraces(
   const t = useTexts();
   const deviceName = useDeviceName();
   const [search] = usePageSearch();
-  const span = isZoomed ? view : null;
+  const settled = useSettled(view);
+  const span = isZoomed ? settled : null;
   const values = useQuery(seriesQuery(head.id, span, POINTS)).data;
   const ids = useMemo(() => listOf(search.refs).filter((one) => one !== head.id), [search.refs, head.id]);
   const laid = useQueries({
-    queries: ids.map((id) => seriesQuery(id, view, POINTS)),
+    queries: ids.map((id) => seriesQuery(id, settled, POINTS)),
     combine: (results) => results.map((one) => one.data),
   });
   return useMemo(() => {
@@ -234,6 +237,13 @@ function useTraces(
     });
     return [...own, ...over];
   }, [values, head.signals, deviceName, t, ids, laid, captures]);
+}
+
+/** The view once it stands: a drag is not a request for every pixel. */
+function useSettled([fromS, toS]: Pair): Pair {
+  const [from] = useDebouncedValue(fromS, SETTLES_MS);
+  const [to] = useDebouncedValue(toS, SETTLES_MS);
+  return useMemo(() => [from, to], [from, to]);
 }
 
 const thirds = (view: Pair): Pair => [

@@ -8,6 +8,7 @@ import { useRole } from "../../../frame/role";
 import { useTexts } from "../../../texts/texts";
 import { stationName } from "../../../ui/devices";
 import room from "../../../ui/Room.module.css";
+import { useTyped } from "../../../ui/useTyped";
 import { CapturesPanel } from "./CapturesPanel";
 import { CaptureView } from "./CaptureView";
 import { type Draft, draftOf, FIRST } from "./draft";
@@ -34,9 +35,10 @@ export function ScopeTab() {
   const role = useRole();
   const stations = (turbine?.stations ?? []).filter((one) => one.blade !== null);
   const station = stations.find((one) => String(one.blade) === search.blade) ?? stations[0];
-  const draft = draftOfText(search.trigger, turbine?.slug) ?? (line?.order ? draftOf(line.order) : FIRST);
+  const [text, setText] = useTyped(search.trigger ?? "", (typed) => update({ trigger: typed }));
+  const draft = draftOfText(text || undefined, turbine?.slug) ?? (line?.order ? draftOf(line.order) : FIRST);
   const setDraft = (change: Partial<Draft>) =>
-    update({ trigger: draftText(withSignal({ ...draft, ...change }, chosen, options)) });
+    setText(draftText(withSignal({ ...draft, ...change }, chosen, options)));
   const [side, setSide] = useState<Side>(replayed ? "captures" : "signals");
   const locked = replayed || !role.may("technician") || turbine === undefined;
   const chosen = chosenOf(search.channels, line?.order?.signals, turbine?.slug);
