@@ -298,7 +298,7 @@ class Control:
         self.own()  # before the look: a FEATHER that comes after it is not ended by what is sent here
         mode = changed.was or AxisMode.PROFILE_POSITION
         shown = await self.number(MODE_SHOWN)
-        if shown == mode or shown != changed.now:
+        if shown == mode or not changed.stands(shown):
             return True
         word = await self.number(CONTROLWORD)
         if word & _EFC or not await self.status() & REMOTE or await self.state() in ENERGISED:

@@ -14,6 +14,8 @@ from app.store.store import Store
 from app.wire.nmt import NmtState
 
 KEY: Final = "motion.left"
+_EMERGENCY_DRIVE: Final = 1
+"""Profile position: a drive to feather leaves it behind (OAT manual, external EFC)."""
 
 
 class Changed(NamedTuple):
@@ -28,6 +30,10 @@ class ModeChanged(NamedTuple):
 
     was: int
     now: int
+
+    def stands(self, shown: int) -> bool:
+        """The axis is in the mode that was set last, or in that of an emergency drive since, not in somebody else's."""
+        return shown in (self.now, _EMERGENCY_DRIVE)
 
 
 @dataclass
@@ -85,7 +91,7 @@ class Left:
         time after a restart.
         """
         found = self._found.setdefault(device, _Found())
-        if found.mode is None or found.mode.now != mode:
+        if found.mode is None or not found.mode.stands(mode):
             found.mode = ModeChanged(mode, mode)
             await self._keep()
 
