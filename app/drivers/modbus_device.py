@@ -70,6 +70,8 @@ class SizeSearch:
         if self._likely:
             self.size = self._likely.pop(0)
             return True
+        if abort_code == Abort.LENGTH:
+            return False  # it does not say which way: nothing is nearer than before
         self.size = (self._least + self._most) // 2
         return self._told and self._least <= self._most
 

@@ -127,6 +127,21 @@ async def test_a_size_that_is_not_found_is_the_refusal_of_the_device() -> None:
         assert len(odd.seen) == 5
 
 
+@pytest.mark.parametrize("first", [Abort.LENGTH_TOO_HIGH, Abort.LENGTH_TOO_LOW])
+@pytest.mark.parametrize("later", [Abort.LENGTH, Abort.LENGTH_TOO_HIGH, Abort.LENGTH_TOO_LOW])
+async def test_the_search_for_a_size_ends_whatever_the_device_says(first: Abort, later: Abort) -> None:
+    class Fickle(Bad):
+        async def instead(self, message: Message, request: object) -> bytes | None:
+            return reply(message, AbortAnswer(first if len(self.seen) == 1 else later))
+
+    fickle = Fickle()
+    async with small(fickle) as (driver, _):
+        async with asyncio.timeout(PATIENCE_S):
+            with pytest.raises(SdoAbortError):
+                await driver.read(1, WINDOW)
+        assert len(fickle.seen) <= 13
+
+
 async def test_a_refusal_names_the_object_and_the_state_of_the_device() -> None:
     async with small(Bad()) as (driver, _):
         with pytest.raises(SdoAbortError) as caught:
