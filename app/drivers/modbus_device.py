@@ -94,34 +94,47 @@ class ModbusDevice:
         self._commands = commands
         self._link: ModbusLink | None = None
         self._reopening: asyncio.Task[None] | None = None
+        self._opening = asyncio.Lock()
+        self._closed = 0
         self._changed = asyncio.Event()
 
     # -- the connection ------------------------------------------------------------------
 
     async def open(self, timeout_s: float) -> None:
-        """Connect; nothing where it is connected. Raises BusOpenError."""
-        if self.state is LinkState.CONNECTED:
-            return
-        link = ModbusLink(self.peer, self._bus, self._stamper, self._tap, self._on_lost)
-        await link.open(timeout_s)
-        self._link = link
-        self._turn(LinkState.CONNECTED, "")
+        """Connect; nothing where it is connected. Raises BusOpenError, BusLostError (it was closed meanwhile)."""
+        async with self._opening:
+            if self.state is LinkState.CONNECTED:
+                return
+            closed = self._closed
+            link = ModbusLink(
+                self.peer, self._bus, self._stamper, self._tap, lambda error: self._on_lost(link, error)
+            )
+            await link.open(timeout_s)
+            if self._closed != closed:
+                error = self._not_connected()
+                await link.close(error)
+                raise error
+            self._link = link
+            self._turn(LinkState.CONNECTED, "")
 
     async def close(self) -> None:
         """End the connection for good; what runs ends with BusLostError."""
+        self._closed += 1
         self._turn(LinkState.CLOSED, LinkState.CLOSED.value)
-        if self._reopening is not None:
-            self._reopening.cancel()
-            await asyncio.gather(self._reopening, return_exceptions=True)
-            self._reopening = None
-        if self._link is not None:
-            await self._link.close(self._not_connected())
+        link, self._link = self._link, None
+        reopening, self._reopening = self._reopening, None
+        if reopening is not None:
+            reopening.cancel()
+        if link is not None:
+            await link.close(self._not_connected())
+        if reopening is not None:
+            await asyncio.gather(reopening, return_exceptions=True)
 
     async def renew(self) -> None:
         """End the connection and open it again as soon as the device lets us."""
-        link = self.link
-        await link.close(BusLostError(bus=self._bus, reason="renewed"))
-        self._on_lost(BusLostError(bus=self._bus, reason="renewed"))
+        link, error = self.link, BusLostError(bus=self._bus, reason="renewed")
+        self._on_lost(link, error)  # first: who is cancelled below leaves no connection that only seems to be one
+        await link.close(error)
 
     @property
     def link(self) -> ModbusLink:
@@ -144,9 +157,11 @@ class ModbusDevice:
         self.state, self.reason, self.since_ns = state, reason, self._stamper()
         self._changed.set()
 
-    def _on_lost(self, error: BusLostError | ProtocolError) -> None:
-        if self.state is LinkState.CONNECTED:
-            self._turn(LinkState.LOST, str(error.details["reason"]))
+    def _on_lost(self, link: ModbusLink, error: BusLostError | ProtocolError) -> None:
+        if link is not self._link or self.state is not LinkState.CONNECTED:
+            return
+        self._turn(LinkState.LOST, str(error.details["reason"]))
+        if self._reopening is None or self._reopening.done():
             self._reopening = asyncio.get_running_loop().create_task(self._reopen())
 
     async def _reopen(self) -> None:

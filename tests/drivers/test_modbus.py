@@ -277,6 +277,61 @@ async def test_connecting_again_keeps_the_connection() -> None:
         assert server.connections == 1
 
 
+# -- opening, closing and renewing at the same time -----------------------------------------
+
+
+async def test_opened_twice_at_once_there_is_one_connection() -> None:
+    bad = Bad()
+    async with serving(bad) as server:
+        driver = ModbusDriver(ModbusConfig((server.peer,)), stamper(), descriptions=(PD4E,))
+        await asyncio.gather(driver.connect(), driver.connect(), driver.scan())
+        assert await driver.read(1, WINDOW) == bad.dictionary.objects[WINDOW]
+        assert server.connections == 1
+        await driver.close()
+
+
+async def test_what_is_closed_while_it_opens_stays_closed() -> None:
+    async with serving(Bad()) as server:
+        driver = ModbusDriver(ModbusConfig((server.peer,)), stamper(), descriptions=(PD4E,))
+        connecting = asyncio.create_task(driver.connect())
+        await asyncio.sleep(0)
+        await asyncio.sleep(0)
+        await driver.close()
+        with pytest.raises(BusLostError):
+            await connecting
+        assert driver.status.state is LinkState.CLOSED
+        async with asyncio.timeout(PATIENCE_S):
+            while server.connections == 0 or server.open_connections:  # noqa: ASYNC110  the server has no event for it
+                await asyncio.sleep(0.001)
+
+
+async def test_a_renewal_that_is_cancelled_ends_in_a_connection_that_is_one() -> None:
+    bad = Bad()
+    async with small(bad) as (driver, server):
+        device = driver._device(1)
+        renewing = asyncio.create_task(device.renew())
+        await asyncio.sleep(0)
+        renewing.cancel()
+        await asyncio.gather(renewing, return_exceptions=True)
+        assert renewing.cancelled()
+        assert await becomes(driver, LinkState.CONNECTED) is LinkState.CONNECTED
+        assert await driver.read(1, WINDOW) == bad.dictionary.objects[WINDOW]
+        assert server.connections == 2
+
+
+async def test_the_end_of_an_earlier_connection_is_not_that_of_the_present_one() -> None:
+    bad = Bad()
+    async with small(bad) as (driver, server):
+        device = driver._device(1)
+        earlier = device.link
+        await device.renew()
+        await becomes(driver, LinkState.CONNECTED)
+        earlier._on_lost(BusLostError(bus="modbus0", reason="late news"))
+        assert device.state is LinkState.CONNECTED
+        assert await driver.read(1, WINDOW) == bad.dictionary.objects[WINDOW]
+        assert server.connections == 2
+
+
 # -- STOP ------------------------------------------------------------------------------
 
 
