@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import socket
 import struct
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
@@ -13,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from app.drivers import modbus_link
+from app.drivers.modbus_config import ModbusPeer
 from app.drivers.modbus_link import MAX_UNANSWERED, InterruptedRequest, ModbusLink
 from app.errors import BusLostError, BusOpenError, NoAnswerError, ProtocolError
 from app.model.address import Address
@@ -257,6 +259,54 @@ async def test_nobody_listens() -> None:
         with pytest.raises(BusLostError):
             await other.link.request(READ, PATIENCE_S)
         await side.server.start()
+
+
+@asynccontextmanager
+async def unread() -> AsyncIterator[tuple[ModbusLink, socket.socket]]:
+    """A link to a device that reads nothing by itself and soon takes no more, and the device's end of the connection."""
+    with socket.socket() as listening:
+        listening.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2048)
+        listening.bind(("127.0.0.1", 0))
+        listening.listen()
+        peer = ModbusPeer(1, "127.0.0.1", listening.getsockname()[1])
+        link = ModbusLink(peer, "modbus0", stamper(), lambda frame: None, lambda error: None)
+        await link.open(PATIENCE_S)
+        device, _ = listening.accept()
+        with device:
+            device.settimeout(PATIENCE_S)
+            try:
+                yield link, device
+            finally:
+                await link.close()
+
+
+@pytest.mark.parametrize("given_up", [False, True])
+async def test_what_a_dead_connection_still_holds_never_arrives(given_up: bool) -> None:
+    """A GO that the device has not taken must not be taken after a STOP on the next connection."""
+    async with unread() as (link, device):
+        for _ in range(40):
+            with pytest.raises(NoAnswerError):
+                await link.request(WriteObject(Address(0x1008), bytes(240)), 0.001)
+        go = asyncio.create_task(link.request(WRITE, 0.01 if given_up else PATIENCE_S))
+        if given_up:
+            with pytest.raises(NoAnswerError):
+                await go
+        else:
+            await turns_of_the_loop()
+        await link.close()
+        await asyncio.gather(go, return_exceptions=True)
+        received = b""
+        with pytest.raises(ConnectionResetError):
+            while data := device.recv(4096):
+                received += data
+        assert received
+        assert WRITE.pdu() not in received
+
+
+async def test_a_connection_that_owes_nothing_is_closed_in_order() -> None:
+    async with unread() as (link, device):
+        await link.close()
+        assert device.recv(100) == b""
 
 
 # -- what is given up ---------------------------------------------------------------
