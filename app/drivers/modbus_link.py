@@ -38,7 +38,9 @@ _LOG: Final = logging.getLogger(__name__)
 URGENT_GRACE_S: Final = 0.02
 """So long an urgent request waits for the answer that is under way; then that transaction is given up."""
 MAX_UNANSWERED: Final = 64
-"""A device that leaves so many requests unanswered is not there any more."""
+"""A device that leaves so many requests unanswered, one after another, is not there any more."""
+MAX_REMEMBERED: Final = 1024
+"""So many given up requests are remembered: an answer that comes later than these is one that nobody asked for."""
 _UNSENT_BYTES: Final = 1 << 12
 _READ_BYTES: Final = 1 << 16
 _LINGER: Final = struct.Struct("hh" if sys.platform == "win32" else "ii")
@@ -81,6 +83,8 @@ class ModbusLink:
         self._transaction = 0
         self._open: tuple[int, Attempt] | None = None
         self._given_up: dict[int, Attempt] = {}
+        self._unanswered = 0
+        """Given up since the last request that has an answer: of these nobody knows whether they have arrived."""
         self._streams: tuple[asyncio.StreamReader, asyncio.StreamWriter] | None = None
         self._receiving: asyncio.Task[None] | None = None
         self._ended: BusLostError | ProtocolError | None = None
@@ -195,7 +199,10 @@ class ModbusLink:
         self._given_up[self._open[0]] = attempt
         self._open = None
         attempt.future.cancel()
-        if len(self._given_up) > MAX_UNANSWERED:
+        if len(self._given_up) > MAX_REMEMBERED:
+            del self._given_up[next(iter(self._given_up))]
+        self._unanswered += 1
+        if self._unanswered > MAX_UNANSWERED:
             self._end(BusLostError(bus=self._bus, reason=f"{MAX_UNANSWERED} requests were not answered"))
 
     # -- receiving ---------------------------------------------------------------------
@@ -226,6 +233,8 @@ class ModbusLink:
             asked = f"unit {self.peer.unit}, {type(attempt.request).__name__}"
             self._violated(f"unit {message.unit}, function {message.function} is no answer to: {asked}")
             return
+        later = [] if is_open else list(self._given_up)
+        self._unanswered = len(later) - 1 - later.index(message.transaction) if later else 0
         self._open = None if is_open else self._open
         self._given_up.pop(message.transaction, None)
         if attempt.future.done():
@@ -250,7 +259,7 @@ class ModbusLink:
             return
         self._ended = error
         if self._streams is not None:
-            if tell or self._open is not None or self._given_up:
+            if tell or self._open is not None or self._unanswered:
                 self._streams[1].transport.abort()
             else:
                 self._reset_at_end(False)

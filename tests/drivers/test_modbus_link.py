@@ -393,6 +393,58 @@ async def test_a_device_that_answers_nothing_at_all_is_not_there() -> None:
         assert len(side.lost) == 1
 
 
+async def test_a_device_that_leaves_some_unanswered_is_still_there() -> None:
+    async with linked() as side:
+        for _ in range(2 * MAX_UNANSWERED):
+            given_up, _ = await side.asked(READ)
+            given_up.cancel()
+            task, message = await side.asked(READ)
+            side.held.say(reply(message, VALUE))
+            assert await task == VALUE
+        assert side.lost == []
+
+
+async def test_of_those_given_up_the_earliest_are_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(modbus_link, "MAX_REMEMBERED", 2)
+    async with linked() as side:
+        messages = []
+        for _ in range(3):
+            task, message = await side.asked(READ)
+            task.cancel()
+            messages.append(message)
+        side.held.say(reply(messages[1], VALUE) + reply(messages[2], VALUE))
+        task, message = await side.asked(READ)
+        side.held.say(reply(message, VALUE))
+        assert await task == VALUE
+        assert side.link.late == 2
+        task, _ = await side.asked(READ)
+        side.held.say(reply(messages[0], VALUE))
+        with pytest.raises(ProtocolError):
+            await task
+
+
+async def test_a_late_answer_says_nothing_of_what_was_given_up_after_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(modbus_link, "MAX_UNANSWERED", 3)
+    async with linked() as side:
+        messages = []
+        for _ in range(3):
+            task, message = await side.asked(READ)
+            task.cancel()
+            messages.append(message)
+        side.held.say(reply(messages[1], VALUE))
+        while not side.link.late:  # noqa: ASYNC110  nothing tells but the link itself
+            await asyncio.sleep(0.001)
+        for _ in range(2):
+            task, _ = await side.asked(READ)
+            task.cancel()
+        await turns_of_the_loop()
+        assert side.lost == []  # three are unanswered since
+        task, _ = await side.asked(READ)
+        task.cancel()
+        await turns_of_the_loop()
+        assert len(side.lost) == 1
+
+
 @settings(deadline=None, max_examples=40)
 @given(st.lists(st.sampled_from(("answered", "timed out", "cancelled", "late ones only")), min_size=1, max_size=12))
 def test_every_answer_goes_to_its_own_request(plan: list[str]) -> None:
