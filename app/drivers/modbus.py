@@ -10,6 +10,7 @@ import asyncio
 import logging
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import nullcontext
 from datetime import UTC, datetime
 from typing import Final
 
@@ -191,11 +192,8 @@ class ModbusDriver:
         device = self._device(node)
         if urgent:
             known = self._commands.note(node, address)
-        try:
+        with self._process[node].changing() if address.major in MAPPINGS else nullcontext():
             return await device.write(address, data, timeout_s, verify, urgent, known)
-        finally:
-            if address.major in MAPPINGS:
-                self._process[node].forget()
 
     def commanded(self, node: int, address: Address) -> int:
         """See Driver."""

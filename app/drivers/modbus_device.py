@@ -106,9 +106,7 @@ class ModbusDevice:
             if self.state is LinkState.CONNECTED:
                 return
             closed = self._closed
-            link = ModbusLink(
-                self.peer, self._bus, self._stamper, self._tap, lambda error: self._on_lost(link, error)
-            )
+            link = ModbusLink(self.peer, self._bus, self._stamper, self._tap, lambda error: self._on_lost(link, error))
             await link.open(timeout_s)
             if self._closed != closed:
                 error = self._not_connected()

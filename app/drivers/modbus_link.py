@@ -8,8 +8,8 @@ breaks is not known. Its transaction is remembered instead, and not used again b
 recognised by it and never taken for that of another request. The server answers in order, so a write that follows is
 executed after it.
 
-A connection that ends while a request is unanswered is reset, not closed: what has not left for the device yet is thrown
-away. Else it could arrive after a STOP on the next connection.
+A connection that ends while a request is unanswered is reset, not closed: what has not arrived yet is thrown away, as
+it could follow a STOP on the next connection.
 """
 
 from __future__ import annotations

@@ -263,7 +263,7 @@ async def test_nobody_listens() -> None:
 
 @asynccontextmanager
 async def unread() -> AsyncIterator[tuple[ModbusLink, socket.socket]]:
-    """A link to a device that reads nothing by itself and soon takes no more, and the device's end of the connection."""
+    """A link to a device that reads nothing by itself and soon takes no more, and the device's end of it."""
     with socket.socket() as listening:
         listening.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2048)
         listening.bind(("127.0.0.1", 0))
