@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable, Iterator
+from contextlib import contextmanager
 from typing import Final
 
 from app.drivers.contract import LinkState, Written
@@ -22,6 +23,7 @@ from app.errors import (
     ModbusExceptionError,
     NoAnswerError,
     OvertakenError,
+    PreconditionError,
     ProtocolError,
     RefusedError,
     SdoAbortError,
@@ -96,6 +98,7 @@ class ModbusDevice:
         self._reopening: asyncio.Task[None] | None = None
         self._opening = asyncio.Lock()
         self._closed = 0
+        self._saves: list[Address] = []
         self._changed = asyncio.Event()
 
     # -- the connection ------------------------------------------------------------------
@@ -184,43 +187,82 @@ class ModbusDevice:
             except InterruptedRequest:
                 continue
 
-    async def read(self, address: Address, timeout_s: float | None = None, urgent: bool = False) -> bytes:
+    async def read(
+        self, address: Address, timeout_s: float | None = None, urgent: bool = False, held: ModbusLink | None = None
+    ) -> bytes:
         """One object. Raises SdoAbortError, ModbusExceptionError, NoAnswerError, BusLostError, ProtocolError.
 
         The number of bytes has to be that of the object: where the device refuses the described one, it is looked for.
+        ``held``: the connection whose turn the caller holds; InterruptedRequest is raised then too.
         """
         wait_s = self._timeout_s(address, timeout_s)
         sizes = SizeSearch(self._sizes(address))
         while True:
-            answer = await self.ask(ReadObject(address, sizes.size), wait_s, urgent, str(address))
+            request, what = ReadObject(address, sizes.size), str(address)
+            if held is None:
+                answer = await self.ask(request, wait_s, urgent, what)
+            else:
+                answer = await held.finish(held.send(request, urgent), wait_s, what)
             if isinstance(answer, ObjectRead):
                 return answer.data
             if not isinstance(answer, AbortAnswer) or not sizes.refused(answer.abort_code):
-                raise self.refusal(answer, str(address))
+                raise self.refusal(answer, what)
 
     async def write(
         self, address: Address, data: bytes, timeout_s: float | None = None,
         verify: Verify = Verify.EQUAL, urgent: bool = False, known: int | None = None,
+        before: Callable[[ModbusLink], Awaitable[None]] | None = None,
     ) -> Written:  # fmt: skip
-        """Write once. See ``contract.Driver.write``."""
+        """Write once. See ``contract.Driver.write``.
+
+        ``before`` is awaited in the same turn right before the write is sent, and again where it had to make room for
+        an urgent request; what it raises else ends the write unsent.
+        """
         if len(data) > MAX_OBJECT_DATA:
             reason = f"{len(data)} bytes do not fit one message ({MAX_OBJECT_DATA} do)"
             raise RefusedError(device=self.peer.server, address=address.short, reason=reason)
         link, wait_s = self.link, self._timeout_s(address, timeout_s)
         if address.major in _SLOW:
             wait_s = max(wait_s, SAVE_TIMEOUT_S)
-        async with link.turn(urgent):
-            self.require_known(address, known)
-            attempt = link.send(WriteObject(address, data), urgent)
-            answer = await self._end_of_write(link, attempt, address, wait_s)
-        if answer is None:
-            return await self._look_at(attempt, address, data, verify, urgent)
-        return await self._written(answer, address, urgent)
+        while True:
+            async with link.turn(urgent):
+                self.require_known(address, known)
+                if not urgent:
+                    self.require_no_save(address)
+                if before is not None:
+                    try:
+                        await before(link)
+                    except InterruptedRequest:
+                        continue
+                attempt = link.send(WriteObject(address, data), urgent)
+                answer = await self._end_of_write(link, attempt, address, wait_s)
+            if answer is None:
+                return await self._look_at(attempt, address, data, verify, urgent)
+            return await self._written(answer, address, urgent)
 
     def require_known(self, address: Address, known: int | None) -> None:
         """Raises OvertakenError where an urgent command came to the object that a write did not know of."""
         if known is not None and self._commands.count(self.peer.node, address) != known:
             raise OvertakenError(bus=self._bus, node=self.peer.node, address=address.short)
+
+    @contextmanager
+    def saving(self, entry: Address) -> Iterator[None]:
+        """Until the save by ``entry`` has ended: nothing is sent that could start the motor, but what is urgent."""
+        self._saves.append(entry)
+        try:
+            yield
+        finally:
+            self._saves.remove(entry)
+
+    def require_no_save(self, address: Address, motion: bool = False) -> None:
+        """Raises PreconditionError where a save is under way, and a write to ``address`` could start the motor.
+
+        ``motion``: so it could, whatever the description says of the object.
+        """
+        entry = None if self.description is None else self.description.entries.get(address)
+        if self._saves and (motion or (entry is not None and entry.motion)):
+            needs, found = "an ended save", f"a save by {self._saves[0].short} under way"
+            raise PreconditionError(address=address.short, name=self.name(address), needs=needs, found=found)
 
     async def _end_of_write(self, link: ModbusLink, attempt: Attempt, address: Address, wait_s: float) -> Answer | None:
         """The answer, None where there was none in time."""

@@ -134,6 +134,7 @@ class ProcessData:
         async with images.link.turn():
             self._require_unchanged(generation)
             for address in values:
+                self._device.require_no_save(address, motion=True)
                 self._device.require_known(address, known.get(address))
             try:
                 return await images.link.finish(images.link.send(request), timeout_s, what=_what(values))

@@ -25,6 +25,7 @@ from app.wire.modbus.decoder import ModbusDecoder
 from app.wire.modbus.functions import Function, Phase
 from app.wire.modbus.requests import ReadDictionary, ReadObject, Request, WriteObject
 from app.wire.records import ValueSeen
+from tests.drivers.modbus_rig import turns_of_the_loop
 from tests.drivers.modbus_server import Server, reply, serving
 from tests.drivers.wire import stamper
 
@@ -74,12 +75,6 @@ class Side:
         """A request that has reached the server."""
         task = self.ask(request, timeout_s, urgent)
         return task, await self.held.next()
-
-
-async def turns_of_the_loop() -> None:
-    """Let everything happen that needs no answer."""
-    for _ in range(20):
-        await asyncio.sleep(0)
 
 
 @asynccontextmanager
