@@ -90,6 +90,8 @@ class ModbusDevice:
         self.reason = ""
         self.reconnects = 0
         self.description: Description | None = None
+        self.has_dictionary = True
+        """Whether FC 101 is worth asking; False since an answer showed that it is not, until the device is closed."""
         self._bus = bus
         self._stamper = stamper
         self._tap = tap
@@ -121,6 +123,7 @@ class ModbusDevice:
     async def close(self) -> None:
         """End the connection for good; what runs ends with BusLostError."""
         self._closed += 1
+        self.has_dictionary = True
         self._turn(LinkState.CLOSED, LinkState.CLOSED.value)
         link, self._link = self._link, None
         reopening, self._reopening = self._reopening, None
@@ -265,10 +268,10 @@ class ModbusDevice:
             raise PreconditionError(address=address.short, name=self.name(address), needs=needs, found=found)
 
     async def _end_of_write(self, link: ModbusLink, attempt: Attempt, address: Address, wait_s: float) -> Answer | None:
-        """The answer, None where there was none in time."""
+        """The answer, None where there was none in time. Raises BusLostError where the connection has ended."""
         try:
             return await link.finish(attempt, wait_s, str(address))
-        except BusLostError as error:
+        except (BusLostError, ProtocolError) as error:
             reason = f"lost while writing, outcome unknown ({error.details['reason']})"
             raise BusLostError(bus=self._bus, node=self.peer.node, address=str(address), reason=reason) from error
         except (InterruptedRequest, NoAnswerError):

@@ -238,6 +238,23 @@ async def test_a_write_whose_connection_ends_is_unknown_and_not_repeated() -> No
         assert driver.status.reconnects == 1
 
 
+async def test_a_write_that_is_answered_with_nonsense_is_unknown() -> None:
+    class Nonsense(Bad):
+        async def instead(self, message: Message, request: object) -> bytes | None:
+            if isinstance(request, WriteObject):
+                return reply(message, ObjectWritten(POSITION))
+            return None
+
+    nonsense = Nonsense()
+    async with small(nonsense) as (driver, _):
+        with pytest.raises(BusLostError) as caught:
+            await driver.write(1, WINDOW, FOUR, timeout_s=PATIENCE_S)
+        assert "outcome unknown" in caught.value.details["reason"]
+        assert "is no answer to" in caught.value.details["reason"]
+        await becomes(driver, LinkState.CONNECTED)
+        assert nonsense.count(WriteObject) == 1
+
+
 async def test_a_lost_device_refuses_at_once_and_comes_back() -> None:
     bad = Bad()
     async with small(bad) as (driver, server):
