@@ -14,6 +14,7 @@ from typing import Final
 from app.drivers.contract import LinkState, Written
 from app.drivers.modbus_config import ModbusPeer
 from app.drivers.modbus_link import Attempt, InterruptedRequest, ModbusLink
+from app.drivers.modbus_size import SIZES, SizeSearch
 from app.drivers.urgent import UrgentCommands
 from app.errors import (
     BusLostError,
@@ -36,7 +37,7 @@ from app.wire.frame import Frame, Stamper
 from app.wire.modbus.answers import AbortAnswer, Answer, ExceptionAnswer, ObjectRead
 from app.wire.modbus.functions import exception_text_key
 from app.wire.modbus.requests import MAX_OBJECT_DATA, ReadObject, Request, WriteObject
-from app.wire.sdo import Abort, abort_text_key
+from app.wire.sdo import abort_text_key
 
 _LOG: Final = logging.getLogger(__name__)
 DEFAULT_TIMEOUT_S: Final = 1.0
@@ -45,37 +46,7 @@ SAVE_TIMEOUT_S: Final = 10.0
 STATUSWORD: Final = Address(0x6041)
 _SLOW: Final = frozenset({0x1010, 0x1011})
 _REOPEN_S: Final = (0.1, 0.2, 0.5, 1.0, 2.0)
-_SIZES: Final = (4, 2, 1, 8, MAX_OBJECT_DATA)
-"""Bytes that are asked for where the size is not known, or another one than described; texts may have fewer."""
 _STATE_NAMES: Final = {AxisState.READY: "ready_to_switch_on", AxisState.NOT_READY: "not_ready_to_switch_on"}
-_WRONG_SIZE: Final = frozenset({Abort.LENGTH, Abort.LENGTH_TOO_HIGH, Abort.LENGTH_TOO_LOW})
-
-
-class SizeSearch:
-    """Looks for the size of an object: ``likely`` ones first, then between those that were too high and too low."""
-
-    def __init__(self, likely: tuple[int, ...]) -> None:
-        self.size = likely[0]
-        self._likely = list(likely[1:])
-        self._least, self._most = 1, MAX_OBJECT_DATA
-        self._told = False
-
-    def refused(self, abort_code: int) -> bool:
-        """The device refused ``size``. True where there is another one to try, which ``size`` is then."""
-        if abort_code not in _WRONG_SIZE:
-            return False
-        if abort_code == Abort.LENGTH_TOO_HIGH:
-            self._most, self._told = self.size - 1, True
-        elif abort_code == Abort.LENGTH_TOO_LOW:
-            self._least, self._told = self.size + 1, True
-        self._likely = [size for size in self._likely if self._least <= size <= self._most]
-        if self._likely:
-            self.size = self._likely.pop(0)
-            return True
-        if abort_code == Abort.LENGTH:
-            return False  # it does not say which way: nothing is nearer than before
-        self.size = (self._least + self._most) // 2
-        return self._told and self._least <= self._most
 
 
 class ModbusDevice:
@@ -341,9 +312,9 @@ class ModbusDevice:
     def _sizes(self, address: Address) -> tuple[int, ...]:
         entry = None if self.description is None else self.description.entries.get(address)
         if entry is None:
-            return _SIZES
+            return SIZES
         size = entry.type.size or MAX_OBJECT_DATA
-        return (size, *(other for other in _SIZES if other != size))
+        return (size, *(other for other in SIZES if other != size))
 
     def _timeout_s(self, address: Address, timeout_s: float | None) -> float:
         if timeout_s is not None:

@@ -311,8 +311,8 @@ async def test_what_is_closed_while_it_opens_stays_closed() -> None:
     async with serving(Bad()) as server:
         driver = ModbusDriver(ModbusConfig((server.peer,)), stamper(), descriptions=(PD4E,))
         connecting = asyncio.create_task(driver.connect())
-        await asyncio.sleep(0)
-        await asyncio.sleep(0)
+        while not driver._device(1)._opening.locked():  # noqa: ASYNC110  nothing tells that it has begun
+            await asyncio.sleep(0)
         await driver.close()
         with pytest.raises(BusLostError):
             await connecting
