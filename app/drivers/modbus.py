@@ -10,6 +10,7 @@ import asyncio
 import logging
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import nullcontext, suppress
 from datetime import UTC, datetime
 from typing import Final
 
@@ -31,10 +32,19 @@ from app.drivers.modbus_save import Stamp
 from app.drivers.modbus_verify import Finding, compare
 from app.drivers.scan import match
 from app.drivers.urgent import UrgentCommands
-from app.errors import BusOpenError, DeviceError, HubsideError, NoAnswerError, ProtocolError, UsageError
+from app.errors import (
+    BusOpenError,
+    DeviceError,
+    HubsideError,
+    ModbusExceptionError,
+    NoAnswerError,
+    ProtocolError,
+    UsageError,
+)
 from app.model.address import Address
 from app.model.description import Bus, Description, Verify
 from app.wire.frame import Frame, Stamper
+from app.wire.modbus.functions import ModbusException
 
 _LOG: Final = logging.getLogger(__name__)
 BULK: Final = 64
@@ -46,6 +56,7 @@ SOFTWARE: Final = Address(0x100A)
 IDENTITY: Final = tuple(Address(0x1018, sub) for sub in (1, 2, 3, 4))
 _ASKED: Final = (DEVICE_TYPE, DEVICE_NAME, HARDWARE, SOFTWARE, *IDENTITY)
 _SCAN_TIMEOUT_S: Final = 0.5
+_RETURN_S: Final = 5.0
 _PROGRESS_S: Final = 0.05
 
 
@@ -167,11 +178,21 @@ class ModbusDriver:
         return {address: results[address] for address in wanted}
 
     async def _from_dictionary(self, device: ModbusDevice, wanted: tuple[Address, ...]) -> dict[Address, bytes]:
-        """What FC 101 gives of ``wanted``; nothing where the device does not have it."""
+        """What FC 101 gives of ``wanted``; nothing where the device does not have it, which is remembered.
+
+        What no rule allows ends the connection: then its return is awaited.
+        """
+        if not device.has_dictionary:
+            return {}
         try:
             found = await read_dictionary(device)
         except (DeviceError, ProtocolError) as error:
             _LOG.info("FC 101 failed, objects are read one by one: %s", error)
+            device.has_dictionary = not _has_no_such_function(error)
+            if device.state is LinkState.LOST:
+                device.has_dictionary = False
+                with suppress(TimeoutError):
+                    await device.wait_for(LinkState.CONNECTED, _RETURN_S)
             return {}
         except NoAnswerError:
             return {}
@@ -191,11 +212,8 @@ class ModbusDriver:
         device = self._device(node)
         if urgent:
             known = self._commands.note(node, address)
-        try:
+        with self._process[node].changing() if address.major in MAPPINGS else nullcontext():
             return await device.write(address, data, timeout_s, verify, urgent, known)
-        finally:
-            if address.major in MAPPINGS:
-                self._process[node].forget()
 
     def commanded(self, node: int, address: Address) -> int:
         """See Driver."""
@@ -270,6 +288,10 @@ class ModbusDriver:
             known = ", ".join(map(str, sorted(self._devices)))
             raise UsageError(reason=f"node {node} is not configured (there are: {known}; at most {MAX_NODE})")
         return device
+
+
+def _has_no_such_function(error: HubsideError) -> bool:
+    return isinstance(error, ModbusExceptionError) and error.details["exception"] == ModbusException.ILLEGAL_FUNCTION
 
 
 def _number(result: bytes | HubsideError) -> int | None:

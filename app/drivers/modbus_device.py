@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable, Iterator
+from contextlib import contextmanager
 from typing import Final
 
 from app.drivers.contract import LinkState, Written
 from app.drivers.modbus_config import ModbusPeer
 from app.drivers.modbus_link import Attempt, InterruptedRequest, ModbusLink
+from app.drivers.modbus_size import SIZES, SizeSearch
 from app.drivers.urgent import UrgentCommands
 from app.errors import (
     BusLostError,
@@ -22,6 +24,7 @@ from app.errors import (
     ModbusExceptionError,
     NoAnswerError,
     OvertakenError,
+    PreconditionError,
     ProtocolError,
     RefusedError,
     SdoAbortError,
@@ -34,7 +37,7 @@ from app.wire.frame import Frame, Stamper
 from app.wire.modbus.answers import AbortAnswer, Answer, ExceptionAnswer, ObjectRead
 from app.wire.modbus.functions import exception_text_key
 from app.wire.modbus.requests import MAX_OBJECT_DATA, ReadObject, Request, WriteObject
-from app.wire.sdo import Abort, abort_text_key
+from app.wire.sdo import abort_text_key
 
 _LOG: Final = logging.getLogger(__name__)
 DEFAULT_TIMEOUT_S: Final = 1.0
@@ -43,35 +46,7 @@ SAVE_TIMEOUT_S: Final = 10.0
 STATUSWORD: Final = Address(0x6041)
 _SLOW: Final = frozenset({0x1010, 0x1011})
 _REOPEN_S: Final = (0.1, 0.2, 0.5, 1.0, 2.0)
-_SIZES: Final = (4, 2, 1, 8, MAX_OBJECT_DATA)
-"""Bytes that are asked for where the size is not known, or another one than described; texts may have fewer."""
 _STATE_NAMES: Final = {AxisState.READY: "ready_to_switch_on", AxisState.NOT_READY: "not_ready_to_switch_on"}
-_WRONG_SIZE: Final = frozenset({Abort.LENGTH, Abort.LENGTH_TOO_HIGH, Abort.LENGTH_TOO_LOW})
-
-
-class SizeSearch:
-    """Looks for the size of an object: ``likely`` ones first, then between those that were too high and too low."""
-
-    def __init__(self, likely: tuple[int, ...]) -> None:
-        self.size = likely[0]
-        self._likely = list(likely[1:])
-        self._least, self._most = 1, MAX_OBJECT_DATA
-        self._told = False
-
-    def refused(self, abort_code: int) -> bool:
-        """The device refused ``size``. True where there is another one to try, which ``size`` is then."""
-        if abort_code not in _WRONG_SIZE:
-            return False
-        if abort_code == Abort.LENGTH_TOO_HIGH:
-            self._most, self._told = self.size - 1, True
-        elif abort_code == Abort.LENGTH_TOO_LOW:
-            self._least, self._told = self.size + 1, True
-        self._likely = [size for size in self._likely if self._least <= size <= self._most]
-        if self._likely:
-            self.size = self._likely.pop(0)
-            return True
-        self.size = (self._least + self._most) // 2
-        return self._told and self._least <= self._most
 
 
 class ModbusDevice:
@@ -86,40 +61,55 @@ class ModbusDevice:
         self.reason = ""
         self.reconnects = 0
         self.description: Description | None = None
+        self.has_dictionary = True
+        """Whether FC 101 is worth asking; False since an answer showed that it is not, until the device is closed."""
         self._bus = bus
         self._stamper = stamper
         self._tap = tap
         self._commands = commands
         self._link: ModbusLink | None = None
         self._reopening: asyncio.Task[None] | None = None
+        self._opening = asyncio.Lock()
+        self._closed = 0
+        self._saves: list[Address] = []
         self._changed = asyncio.Event()
 
     # -- the connection ------------------------------------------------------------------
 
     async def open(self, timeout_s: float) -> None:
-        """Connect; nothing where it is connected. Raises BusOpenError."""
-        if self.state is LinkState.CONNECTED:
-            return
-        link = ModbusLink(self.peer, self._bus, self._stamper, self._tap, self._on_lost)
-        await link.open(timeout_s)
-        self._link = link
-        self._turn(LinkState.CONNECTED, "")
+        """Connect; nothing where it is connected. Raises BusOpenError, BusLostError (it was closed meanwhile)."""
+        async with self._opening:
+            if self.state is LinkState.CONNECTED:
+                return
+            closed = self._closed
+            link = ModbusLink(self.peer, self._bus, self._stamper, self._tap, lambda error: self._on_lost(link, error))
+            await link.open(timeout_s)
+            if self._closed != closed:
+                error = self._not_connected()
+                await link.close(error)
+                raise error
+            self._link = link
+            self._turn(LinkState.CONNECTED, "")
 
     async def close(self) -> None:
         """End the connection for good; what runs ends with BusLostError."""
+        self._closed += 1
+        self.has_dictionary = True
         self._turn(LinkState.CLOSED, LinkState.CLOSED.value)
-        if self._reopening is not None:
-            self._reopening.cancel()
-            await asyncio.gather(self._reopening, return_exceptions=True)
-            self._reopening = None
-        if self._link is not None:
-            await self._link.close(self._not_connected())
+        link, self._link = self._link, None
+        reopening, self._reopening = self._reopening, None
+        if reopening is not None:
+            reopening.cancel()
+        if link is not None:
+            await link.close(self._not_connected())
+        if reopening is not None:
+            await asyncio.gather(reopening, return_exceptions=True)
 
     async def renew(self) -> None:
         """End the connection and open it again as soon as the device lets us."""
-        link = self.link
-        await link.close(BusLostError(bus=self._bus, reason="renewed"))
-        self._on_lost(BusLostError(bus=self._bus, reason="renewed"))
+        link, error = self.link, BusLostError(bus=self._bus, reason="renewed")
+        self._on_lost(link, error)  # first: who is cancelled below leaves no connection that only seems to be one
+        await link.close(error)
 
     @property
     def link(self) -> ModbusLink:
@@ -142,9 +132,11 @@ class ModbusDevice:
         self.state, self.reason, self.since_ns = state, reason, self._stamper()
         self._changed.set()
 
-    def _on_lost(self, error: BusLostError | ProtocolError) -> None:
-        if self.state is LinkState.CONNECTED:
-            self._turn(LinkState.LOST, str(error.details["reason"]))
+    def _on_lost(self, link: ModbusLink, error: BusLostError | ProtocolError) -> None:
+        if link is not self._link or self.state is not LinkState.CONNECTED:
+            return
+        self._turn(LinkState.LOST, str(error.details["reason"]))
+        if self._reopening is None or self._reopening.done():
             self._reopening = asyncio.get_running_loop().create_task(self._reopen())
 
     async def _reopen(self) -> None:
@@ -169,49 +161,88 @@ class ModbusDevice:
             except InterruptedRequest:
                 continue
 
-    async def read(self, address: Address, timeout_s: float | None = None, urgent: bool = False) -> bytes:
+    async def read(
+        self, address: Address, timeout_s: float | None = None, urgent: bool = False, held: ModbusLink | None = None
+    ) -> bytes:
         """One object. Raises SdoAbortError, ModbusExceptionError, NoAnswerError, BusLostError, ProtocolError.
 
         The number of bytes has to be that of the object: where the device refuses the described one, it is looked for.
+        ``held``: the connection whose turn the caller holds; InterruptedRequest is raised then too.
         """
         wait_s = self._timeout_s(address, timeout_s)
         sizes = SizeSearch(self._sizes(address))
         while True:
-            answer = await self.ask(ReadObject(address, sizes.size), wait_s, urgent, str(address))
+            request, what = ReadObject(address, sizes.size), str(address)
+            if held is None:
+                answer = await self.ask(request, wait_s, urgent, what)
+            else:
+                answer = await held.finish(held.send(request, urgent), wait_s, what)
             if isinstance(answer, ObjectRead):
                 return answer.data
             if not isinstance(answer, AbortAnswer) or not sizes.refused(answer.abort_code):
-                raise self.refusal(answer, str(address))
+                raise self.refusal(answer, what)
 
     async def write(
         self, address: Address, data: bytes, timeout_s: float | None = None,
         verify: Verify = Verify.EQUAL, urgent: bool = False, known: int | None = None,
+        before: Callable[[ModbusLink], Awaitable[None]] | None = None,
     ) -> Written:  # fmt: skip
-        """Write once. See ``contract.Driver.write``."""
+        """Write once. See ``contract.Driver.write``.
+
+        ``before`` is awaited in the same turn right before the write is sent, and again where it had to make room for
+        an urgent request; what it raises else ends the write unsent.
+        """
         if len(data) > MAX_OBJECT_DATA:
             reason = f"{len(data)} bytes do not fit one message ({MAX_OBJECT_DATA} do)"
             raise RefusedError(device=self.peer.server, address=address.short, reason=reason)
         link, wait_s = self.link, self._timeout_s(address, timeout_s)
         if address.major in _SLOW:
             wait_s = max(wait_s, SAVE_TIMEOUT_S)
-        async with link.turn(urgent):
-            self.require_known(address, known)
-            attempt = link.send(WriteObject(address, data), urgent)
-            answer = await self._end_of_write(link, attempt, address, wait_s)
-        if answer is None:
-            return await self._look_at(attempt, address, data, verify, urgent)
-        return await self._written(answer, address, urgent)
+        while True:
+            async with link.turn(urgent):
+                self.require_known(address, known)
+                if not urgent:
+                    self.require_no_save(address)
+                if before is not None:
+                    try:
+                        await before(link)
+                    except InterruptedRequest:
+                        continue
+                attempt = link.send(WriteObject(address, data), urgent)
+                answer = await self._end_of_write(link, attempt, address, wait_s)
+            if answer is None:
+                return await self._look_at(attempt, address, data, verify, urgent)
+            return await self._written(answer, address, urgent)
 
     def require_known(self, address: Address, known: int | None) -> None:
         """Raises OvertakenError where an urgent command came to the object that a write did not know of."""
         if known is not None and self._commands.count(self.peer.node, address) != known:
             raise OvertakenError(bus=self._bus, node=self.peer.node, address=address.short)
 
+    @contextmanager
+    def saving(self, entry: Address) -> Iterator[None]:
+        """Until the save by ``entry`` has ended: nothing is sent that could start the motor, but what is urgent."""
+        self._saves.append(entry)
+        try:
+            yield
+        finally:
+            self._saves.remove(entry)
+
+    def require_no_save(self, address: Address, motion: bool = False) -> None:
+        """Raises PreconditionError where a save is under way, and a write to ``address`` could start the motor.
+
+        ``motion``: so it could, whatever the description says of the object.
+        """
+        entry = None if self.description is None else self.description.entries.get(address)
+        if self._saves and (motion or (entry is not None and entry.motion)):
+            needs, found = "an ended save", f"a save by {self._saves[0].short} under way"
+            raise PreconditionError(address=address.short, name=self.name(address), needs=needs, found=found)
+
     async def _end_of_write(self, link: ModbusLink, attempt: Attempt, address: Address, wait_s: float) -> Answer | None:
-        """The answer, None where there was none in time."""
+        """The answer, None where there was none in time. Raises BusLostError where the connection has ended."""
         try:
             return await link.finish(attempt, wait_s, str(address))
-        except BusLostError as error:
+        except (BusLostError, ProtocolError) as error:
             reason = f"lost while writing, outcome unknown ({error.details['reason']})"
             raise BusLostError(bus=self._bus, node=self.peer.node, address=str(address), reason=reason) from error
         except (InterruptedRequest, NoAnswerError):
@@ -281,9 +312,9 @@ class ModbusDevice:
     def _sizes(self, address: Address) -> tuple[int, ...]:
         entry = None if self.description is None else self.description.entries.get(address)
         if entry is None:
-            return _SIZES
+            return SIZES
         size = entry.type.size or MAX_OBJECT_DATA
-        return (size, *(other for other in _SIZES if other != size))
+        return (size, *(other for other in SIZES if other != size))
 
     def _timeout_s(self, address: Address, timeout_s: float | None) -> float:
         if timeout_s is not None:

@@ -7,6 +7,9 @@ A request that is given up (cancelled, timed out, interrupted) does not end the 
 breaks is not known. Its transaction is remembered instead, and not used again before its late answer has come, which is
 recognised by it and never taken for that of another request. The server answers in order, so a write that follows is
 executed after it.
+
+A connection that ends while a request is unanswered is reset, not closed: what has not arrived yet is thrown away, as
+it could follow a STOP on the next connection.
 """
 
 from __future__ import annotations
@@ -14,6 +17,9 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import socket
+import struct
+import sys
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from typing import Final
@@ -32,9 +38,12 @@ _LOG: Final = logging.getLogger(__name__)
 URGENT_GRACE_S: Final = 0.02
 """So long an urgent request waits for the answer that is under way; then that transaction is given up."""
 MAX_UNANSWERED: Final = 64
-"""A device that leaves so many requests unanswered is not there any more."""
+"""A device that leaves so many requests unanswered, one after another, is not there any more."""
+MAX_REMEMBERED: Final = 1024
+"""So many given up requests are remembered: an answer that comes later than these is one that nobody asked for."""
 _UNSENT_BYTES: Final = 1 << 12
 _READ_BYTES: Final = 1 << 16
+_LINGER: Final = struct.Struct("hh" if sys.platform == "win32" else "ii")
 
 
 class InterruptedRequest(Exception):  # noqa: N818 - it is no error: whoever asked goes on after the urgent request
@@ -74,6 +83,8 @@ class ModbusLink:
         self._transaction = 0
         self._open: tuple[int, Attempt] | None = None
         self._given_up: dict[int, Attempt] = {}
+        self._unanswered = 0
+        """Given up since the last request that has an answer: of these nobody knows whether they have arrived."""
         self._streams: tuple[asyncio.StreamReader, asyncio.StreamWriter] | None = None
         self._receiving: asyncio.Task[None] | None = None
         self._ended: BusLostError | ProtocolError | None = None
@@ -87,6 +98,7 @@ class ModbusLink:
         except (OSError, TimeoutError) as error:
             reason = str(error) or f"no connection within {timeout_s} s"
             raise BusOpenError(bus=self._bus, reason=f"{self.peer.server}: {reason}") from error
+        self._reset_at_end(True)
         host, port = self._streams[1].get_extra_info("sockname")[:2]
         local = f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
         self._names = (f"{local}{ARROW}{self.peer.server}", f"{self.peer.server}{ARROW}{local}")
@@ -187,7 +199,10 @@ class ModbusLink:
         self._given_up[self._open[0]] = attempt
         self._open = None
         attempt.future.cancel()
-        if len(self._given_up) > MAX_UNANSWERED:
+        if len(self._given_up) > MAX_REMEMBERED:
+            del self._given_up[next(iter(self._given_up))]
+        self._unanswered += 1
+        if self._unanswered > MAX_UNANSWERED:
             self._end(BusLostError(bus=self._bus, reason=f"{MAX_UNANSWERED} requests were not answered"))
 
     # -- receiving ---------------------------------------------------------------------
@@ -218,6 +233,8 @@ class ModbusLink:
             asked = f"unit {self.peer.unit}, {type(attempt.request).__name__}"
             self._violated(f"unit {message.unit}, function {message.function} is no answer to: {asked}")
             return
+        later = [] if is_open else list(self._given_up)
+        self._unanswered = len(later) - 1 - later.index(message.transaction) if later else 0
         self._open = None if is_open else self._open
         self._given_up.pop(message.transaction, None)
         if attempt.future.done():
@@ -229,13 +246,24 @@ class ModbusLink:
     def _violated(self, reason: str) -> None:
         self._end(ProtocolError(bus=self._bus, node=self.peer.node, reason=f"{self.peer.server}: {reason}"))
 
+    def _reset_at_end(self, reset: bool) -> None:
+        """What the system has not sent yet is thrown away at the end of the connection, else it is still sent."""
+        if self._streams is not None:
+            linger = _LINGER.pack(int(reset), 0)
+            with contextlib.suppress(OSError):  # it has ended already
+                self._streams[1].get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, linger)
+
     def _end(self, error: BusLostError | ProtocolError, tell: bool = True) -> None:
         """The connection is over, once and for all."""
         if self._ended is not None:
             return
         self._ended = error
         if self._streams is not None:
-            self._streams[1].close()
+            if tell or self._open is not None or self._unanswered:
+                self._streams[1].transport.abort()
+            else:
+                self._reset_at_end(False)
+                self._streams[1].close()
         if self._open is not None and not self._open[1].future.done():
             self._open[1].future.set_exception(error)
         self._open = None

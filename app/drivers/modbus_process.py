@@ -8,12 +8,13 @@ read by FC 43, and none is written.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import Final, NamedTuple
 
 from app.drivers.modbus_device import DEFAULT_TIMEOUT_S, ModbusDevice
 from app.drivers.modbus_link import InterruptedRequest, ModbusLink
-from app.errors import RefusedError, UnverifiedError
+from app.errors import PdoChangedError, RefusedError, UnverifiedError
 from app.model.address import Address
 from app.wire.modbus.answers import Answer, RegistersRead
 from app.wire.modbus.functions import MAX_READ
@@ -49,21 +50,46 @@ class ProcessData:
     def __init__(self, device: ModbusDevice) -> None:
         self._device = device
         self._images: Images | None = None
+        self._generation = 0
+        self._changing = 0
 
     def forget(self) -> None:
         """The mapping may be another one."""
         self._images = None
+        self._generation += 1
+
+    @contextmanager
+    def changing(self) -> Iterator[None]:
+        """While the mapping is being written nothing is exchanged: nobody knows which one is in force."""
+        self._changing += 1
+        self.forget()
+        try:
+            yield
+        finally:
+            self._changing -= 1
+            self.forget()
 
     async def images(self) -> Images:
-        """The process images in force, read where they are not known. Raises RefusedError, and what reads raise."""
-        link = self._device.link
-        if self._images is None or self._images.link is not link:
+        """The process images in force, read where they are not known.
+
+        Raises RefusedError (PdoChangedError while the mapping is being written), and what reads raise.
+        """
+        while True:
+            self._require_unchanged()
+            link, generation = self._device.link, self._generation
+            if self._images is not None and self._images.link is link:
+                return self._images
             received, sent = await self._mapping(RX_MAPPING, RX_REGISTER), await self._mapping(TX_MAPPING, TX_REGISTER)
             received.order = sent.order = await self._order(self._image(sent)) or await self._order(
                 self._image(received)
             )
-            self._images = Images(self._image(received), self._image(sent), link)
-        return self._images
+            if self._generation == generation and self._device.link is link:
+                self._images = Images(self._image(received), self._image(sent), link)
+
+    def _require_unchanged(self, generation: int | None = None) -> None:
+        """Raises PdoChangedError while the mapping is being written, or where it was since ``generation``."""
+        if self._changing or generation not in (None, self._generation):
+            raise PdoChangedError(device=self._device.peer.server, pdo="3502h/3602h")
 
     async def exchange(
         self,
@@ -77,16 +103,19 @@ class ProcessData:
         what ``commanded`` said of written objects; after another urgent command nothing is sent. Values whose order of
         words is not known yet are read by FC 43.
 
-        Raises RefusedError (nothing was sent; OvertakenError too), ModbusExceptionError, NoAnswerError, BusLostError,
-        UnverifiedError (it had to make room for an urgent command; whether it was carried out is not known).
+        Raises RefusedError (nothing was sent; OvertakenError and PdoChangedError too), ModbusExceptionError,
+        NoAnswerError, BusLostError, UnverifiedError (it had to make room for an urgent command; whether it was carried
+        out is not known).
         """
-        images = await self.images()
-        start, quantity = images.sent.span
-        answer = await (
-            self._written(images, values, timeout_s, known or {})
-            if values
-            else self._device.ask(ReadRegisters(start, quantity), timeout_s, what=f"registers from {start}")
-        )
+        while True:
+            images, generation = await self.images(), self._generation
+            start, quantity = images.sent.span
+            if values:
+                answer = await self._written(images, generation, values, timeout_s, known or {})
+                break
+            answer = await self._device.ask(ReadRegisters(start, quantity), timeout_s, what=f"registers from {start}")
+            if generation == self._generation and self._device.link is images.link:
+                break
         if not isinstance(answer, RegistersRead):
             raise self._device.refusal(answer, _what(values or {}))
         found = dict(images.sent.values(start, answer.registers))
@@ -96,13 +125,16 @@ class ProcessData:
         return found
 
     async def _written(
-        self, images: Images, values: Mapping[Address, bytes], timeout_s: float, known: Mapping[Address, int]
-    ) -> Answer:
+        self, images: Images, generation: int, values: Mapping[Address, bytes], timeout_s: float,
+        known: Mapping[Address, int],
+    ) -> Answer:  # fmt: skip
         window = _window(images.received, values)
         registers = _registers(images.received, window, values)
         request = ReadWriteRegisters(*images.sent.span, window.start, registers)
         async with images.link.turn():
+            self._require_unchanged(generation)
             for address in values:
+                self._device.require_no_save(address, motion=True)
                 self._device.require_known(address, known.get(address))
             try:
                 return await images.link.finish(images.link.send(request), timeout_s, what=_what(values))

@@ -1,20 +1,23 @@
 """Saving by categories (PD4-E manual, 7.3.8, pages 88 to 92 and 134 to 137; 1020h: page 142).
 
 A save disturbs the control: the motor must stand still before it and must not be started meanwhile (page 91), so the
-output stage may not follow anything. Date and time go into 1020h before the save; after a restart they tell whether
-what is in force is what was saved then. The sub-indices of the categories are not printed: the device is asked whether
-it has the one that is wanted, and whether it can be saved now.
+output stage may not follow anything, and until the save has ended no motion object is written but urgently. Date and
+time go into 1020h before the save; after a restart they tell whether what is in force is what was saved then. The
+sub-indices of the categories are not printed: the device is asked whether it has the one that is wanted, and whether it
+can be saved now.
 """
 
 from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
+from contextlib import ExitStack
 from datetime import UTC, date, datetime, timedelta
 from typing import Final, NamedTuple
 
 from app.drivers.modbus_device import STATUSWORD, ModbusDevice
-from app.errors import DeviceError, PreconditionError, UnverifiedError, UsageError
+from app.drivers.modbus_link import InterruptedRequest, ModbusLink
+from app.errors import BusLostError, DeviceError, NoAnswerError, PreconditionError, UnverifiedError, UsageError
 from app.model.address import Address
 from app.model.axis_state import FOLLOWING, AxisState
 from app.model.description import SaveCommand, Verify
@@ -67,10 +70,18 @@ async def save(device: ModbusDevice, category: str | None, now: Callable[[], dat
     stamp = Stamp.of(now())
     await device.write(SAVED_DATE, stamp.days.to_bytes(4, "little"))
     await device.write(SAVED_TIME, stamp.ms.to_bytes(4, "little"))
-    await _standstill(device)  # it may have been started meanwhile
     signature = command.signature.to_bytes(4, "little")
-    await device.write(command.address, signature, command.timeout_s, verify=Verify.ACK)
-    await _ended(device, command)
+    with ExitStack() as until_ended:
+
+        async def last_look(link: ModbusLink) -> None:
+            """It may have been started meanwhile. What waits for its turn behind the save comes too late."""
+            await _standstill(device, link)
+            if link.wanted_urgently:
+                raise InterruptedRequest
+            until_ended.enter_context(device.saving(command.address))
+
+        await device.write(command.address, signature, command.timeout_s, verify=Verify.ACK, before=last_look)
+        await _ended(device, command)
     return stamp
 
 
@@ -80,8 +91,9 @@ async def bears(device: ModbusDevice, stamp: Stamp) -> bool:
     return stamp == (int.from_bytes(days, "little"), int.from_bytes(ms, "little"))
 
 
-async def _standstill(device: ModbusDevice) -> None:
-    state = AxisState.of(int.from_bytes(await device.read(STATUSWORD), "little"))
+async def _standstill(device: ModbusDevice, held: ModbusLink | None = None) -> None:
+    """``held``: the connection whose turn the caller holds. Raises PreconditionError, and what reads raise."""
+    state = AxisState.of(int.from_bytes(await device.read(STATUSWORD, held=held), "little"))
     if state is None or state in FOLLOWING:
         found = "unknown" if state is None else state.name.lower()
         raise PreconditionError(
@@ -89,7 +101,7 @@ async def _standstill(device: ModbusDevice) -> None:
         )
     for address in (VELOCITY, SPEED):
         try:
-            speed = int.from_bytes(await device.read(address), "little", signed=True)
+            speed = int.from_bytes(await device.read(address, held=held), "little", signed=True)
         except DeviceError:
             continue  # it has no such object
         if speed:
@@ -108,11 +120,14 @@ async def _ready(device: ModbusDevice, command: SaveCommand) -> None:
 
 
 async def _ended(device: ModbusDevice, command: SaveCommand) -> None:
-    """The entry reads 1 again once the save has ended (page 137)."""
+    """The entry reads 1 again once the save has ended (page 137).
+
+    The save was ordered: a device that answers otherwise meanwhile, or not, has not refused it.
+    """
     value = None
     try:
         async with asyncio.timeout(command.timeout_s):
-            while (value := await _number(device, command.address)) != READY:  # noqa: ASYNC110  only the device knows
+            while (value := await _entry(device, command.address)) != READY:  # noqa: ASYNC110  only the device knows
                 await asyncio.sleep(_POLL_S)
     except TimeoutError:
         raise UnverifiedError(
@@ -124,5 +139,11 @@ async def _ended(device: ModbusDevice, command: SaveCommand) -> None:
         ) from None
 
 
-async def _number(device: ModbusDevice, address: Address) -> int:
-    return int.from_bytes(await device.read(address), "little")
+async def _entry(device: ModbusDevice, address: Address) -> int | None:
+    """What it reads; None where the device does not say it now."""
+    try:
+        return int.from_bytes(await device.read(address), "little")
+    except BusLostError:
+        raise
+    except (DeviceError, NoAnswerError):
+        return None

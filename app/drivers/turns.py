@@ -45,13 +45,15 @@ class Turns:
         except asyncio.CancelledError:
             if turn.done() and not turn.cancelled():
                 self._give_on()  # it was given to us in the same moment
-            else:
+            elif turn in queue:
                 queue.remove(turn)
             raise
 
     def _give_on(self) -> None:
         for queue in (self._urgent, self._waiting):
-            if queue:
-                queue.popleft().set_result(None)
-                return
+            while queue:
+                turn = queue.popleft()
+                if not turn.done():  # else its waiter was cancelled in this very moment
+                    turn.set_result(None)
+                    return
         self._taken = False

@@ -7,15 +7,9 @@ one device (a twin, an EDS, a comparison with the defaults) need not know that t
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Final
 
 from app.errors import UsageError
-from app.model.address import Address
-from app.model.datatypes import Raw
-from app.model.description import Description, Entry, Lookup
-
-_PRODUCT_CODE: Final = Address(0x1018, 2)
-_DEVICE_NAME: Final = Address(0x1008)
+from app.model.description import Description, Entry
 
 
 def as_variant(description: Description, variant: str) -> Description:
@@ -27,24 +21,6 @@ def as_variant(description: Description, variant: str) -> Description:
     name = description.name if detail is None else detail.name
     match = description.match if detail is None else detail.match
     return replace(description, entries=entries, name=name, match=match)
-
-
-def default_of(entry: Entry, variant: str | None) -> Raw | None:
-    """The entry's default in a variant; of none, what all have in common; None where it is not known."""
-    own = entry.variants.get(variant) if variant is not None else None
-    return entry.default if own is None or own.default is None else own.default
-
-
-def variant_of(description: Description, lookup: Lookup) -> str | None:
-    """Which variant a device is, by its product code (1018h/2), else by its name (1008h); None where neither tells."""
-    code, name = lookup(_PRODUCT_CODE), lookup(_DEVICE_NAME)
-    details = description.variant_details.values()
-    for one in details:
-        if code is not None and one.match.product_code == code:
-            return one.id
-    if not isinstance(name, str):
-        return None
-    return next((one.id for one in details if one.match.device_name and one.match.device_name in name), None)
 
 
 def _entry_of(entry: Entry, variant: str) -> Entry:

@@ -59,6 +59,12 @@ async def connected(*peers: ModbusPeer, now: datetime | None = None) -> AsyncIte
         await driver.close()
 
 
+async def turns_of_the_loop() -> None:
+    """Let everything happen that needs no answer."""
+    for _ in range(20):
+        await asyncio.sleep(0)
+
+
 async def no_answer(message: Message, writer: asyncio.StreamWriter) -> None:
     """A device that takes everything and says nothing."""
 

@@ -69,6 +69,10 @@ class Server:
     def peer(self) -> ModbusPeer:
         return ModbusPeer(1, "127.0.0.1", self.port)
 
+    @property
+    def open_connections(self) -> int:
+        return len(self._writers)
+
     async def start(self, port: int = 0) -> None:
         self._server = await asyncio.start_server(self._serve, "127.0.0.1", port)
         self.port = self._server.sockets[0].getsockname()[1]

@@ -127,6 +127,21 @@ async def test_a_size_that_is_not_found_is_the_refusal_of_the_device() -> None:
         assert len(odd.seen) == 5
 
 
+@pytest.mark.parametrize("first", [Abort.LENGTH_TOO_HIGH, Abort.LENGTH_TOO_LOW])
+@pytest.mark.parametrize("later", [Abort.LENGTH, Abort.LENGTH_TOO_HIGH, Abort.LENGTH_TOO_LOW])
+async def test_the_search_for_a_size_ends_whatever_the_device_says(first: Abort, later: Abort) -> None:
+    class Fickle(Bad):
+        async def instead(self, message: Message, request: object) -> bytes | None:
+            return reply(message, AbortAnswer(first if len(self.seen) == 1 else later))
+
+    fickle = Fickle()
+    async with small(fickle) as (driver, _):
+        async with asyncio.timeout(PATIENCE_S):
+            with pytest.raises(SdoAbortError):
+                await driver.read(1, WINDOW)
+        assert len(fickle.seen) <= 13
+
+
 async def test_a_refusal_names_the_object_and_the_state_of_the_device() -> None:
     async with small(Bad()) as (driver, _):
         with pytest.raises(SdoAbortError) as caught:
@@ -223,6 +238,23 @@ async def test_a_write_whose_connection_ends_is_unknown_and_not_repeated() -> No
         assert driver.status.reconnects == 1
 
 
+async def test_a_write_that_is_answered_with_nonsense_is_unknown() -> None:
+    class Nonsense(Bad):
+        async def instead(self, message: Message, request: object) -> bytes | None:
+            if isinstance(request, WriteObject):
+                return reply(message, ObjectWritten(POSITION))
+            return None
+
+    nonsense = Nonsense()
+    async with small(nonsense) as (driver, _):
+        with pytest.raises(BusLostError) as caught:
+            await driver.write(1, WINDOW, FOUR, timeout_s=PATIENCE_S)
+        assert "outcome unknown" in caught.value.details["reason"]
+        assert "is no answer to" in caught.value.details["reason"]
+        await becomes(driver, LinkState.CONNECTED)
+        assert nonsense.count(WriteObject) == 1
+
+
 async def test_a_lost_device_refuses_at_once_and_comes_back() -> None:
     bad = Bad()
     async with small(bad) as (driver, server):
@@ -260,6 +292,61 @@ async def test_connecting_again_keeps_the_connection() -> None:
         await driver.connect()
         assert await driver.read(1, WINDOW) == bad.dictionary.objects[WINDOW]
         assert server.connections == 1
+
+
+# -- opening, closing and renewing at the same time -----------------------------------------
+
+
+async def test_opened_twice_at_once_there_is_one_connection() -> None:
+    bad = Bad()
+    async with serving(bad) as server:
+        driver = ModbusDriver(ModbusConfig((server.peer,)), stamper(), descriptions=(PD4E,))
+        await asyncio.gather(driver.connect(), driver.connect(), driver.scan())
+        assert await driver.read(1, WINDOW) == bad.dictionary.objects[WINDOW]
+        assert server.connections == 1
+        await driver.close()
+
+
+async def test_what_is_closed_while_it_opens_stays_closed() -> None:
+    async with serving(Bad()) as server:
+        driver = ModbusDriver(ModbusConfig((server.peer,)), stamper(), descriptions=(PD4E,))
+        connecting = asyncio.create_task(driver.connect())
+        while not driver._device(1)._opening.locked():  # noqa: ASYNC110  nothing tells that it has begun
+            await asyncio.sleep(0)
+        await driver.close()
+        with pytest.raises(BusLostError):
+            await connecting
+        assert driver.status.state is LinkState.CLOSED
+        async with asyncio.timeout(PATIENCE_S):
+            while server.connections == 0 or server.open_connections:  # noqa: ASYNC110  the server has no event for it
+                await asyncio.sleep(0.001)
+
+
+async def test_a_renewal_that_is_cancelled_ends_in_a_connection_that_is_one() -> None:
+    bad = Bad()
+    async with small(bad) as (driver, server):
+        device = driver._device(1)
+        renewing = asyncio.create_task(device.renew())
+        await asyncio.sleep(0)
+        renewing.cancel()
+        await asyncio.gather(renewing, return_exceptions=True)
+        assert renewing.cancelled()
+        assert await becomes(driver, LinkState.CONNECTED) is LinkState.CONNECTED
+        assert await driver.read(1, WINDOW) == bad.dictionary.objects[WINDOW]
+        assert server.connections == 2
+
+
+async def test_the_end_of_an_earlier_connection_is_not_that_of_the_present_one() -> None:
+    bad = Bad()
+    async with small(bad) as (driver, server):
+        device = driver._device(1)
+        earlier = device.link
+        await device.renew()
+        await becomes(driver, LinkState.CONNECTED)
+        earlier._on_lost(BusLostError(bus="modbus0", reason="late news"))
+        assert device.state is LinkState.CONNECTED
+        assert await driver.read(1, WINDOW) == bad.dictionary.objects[WINDOW]
+        assert server.connections == 2
 
 
 # -- STOP ------------------------------------------------------------------------------

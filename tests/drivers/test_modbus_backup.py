@@ -121,7 +121,40 @@ async def test_a_device_without_fc_101_is_read_one_by_one() -> None:
     bad = Without()
     wanted = [entry.address for entry in PD4E if entry.access.readable][:BULK]
     async with small(bad) as (driver, _):
-        assert await driver.read_many(1, wanted) == {address: bad.dictionary.objects[address] for address in wanted}
+        for _ in range(2):
+            assert await driver.read_many(1, wanted) == {address: bad.dictionary.objects[address] for address in wanted}
+        assert bad.count(ReadDictionary) == 1  # it is remembered
+
+
+async def test_a_device_that_answers_fc_101_with_nonsense_is_read_one_by_one_on_a_new_connection() -> None:
+    class Nonsense(Bad):
+        async def instead(self, message: Message, request: object) -> bytes | None:
+            nonsense = message._replace(pdu=message.pdu + b"\7")
+            return nonsense.encode() if isinstance(request, ReadDictionary) else None
+
+    bad = Nonsense()
+    wanted = [entry.address for entry in PD4E if entry.access.readable][:BULK]
+    async with small(bad) as (driver, server):
+        for _ in range(2):
+            assert await driver.read_many(1, wanted) == {address: bad.dictionary.objects[address] for address in wanted}
+        assert (bad.count(ReadDictionary), server.connections) == (1, 2)
+        await driver.close()
+        await driver.connect()
+        await driver.read_many(1, wanted)
+        assert bad.count(ReadDictionary) == 2  # it may be another device by now
+
+
+async def test_a_device_that_is_busy_is_asked_for_its_dictionary_again() -> None:
+    class BusyOnce(Bad):
+        async def instead(self, message: Message, request: object) -> bytes | None:
+            return reply(message, AbortAnswer(Abort.DEVICE_STATE)) if self.seen == [request] else None
+
+    bad = BusyOnce()
+    wanted = [entry.address for entry in PD4E if entry.access.readable][:BULK]
+    async with small(bad) as (driver, _):
+        for _ in range(2):
+            assert await driver.read_many(1, wanted) == {address: bad.dictionary.objects[address] for address in wanted}
+        assert bad.count(ReadDictionary) > 2
 
 
 async def test_a_backup_makes_room_for_a_stop_and_begins_anew() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import socket
 import struct
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
@@ -13,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from app.drivers import modbus_link
+from app.drivers.modbus_config import ModbusPeer
 from app.drivers.modbus_link import MAX_UNANSWERED, InterruptedRequest, ModbusLink
 from app.errors import BusLostError, BusOpenError, NoAnswerError, ProtocolError
 from app.model.address import Address
@@ -23,6 +25,7 @@ from app.wire.modbus.decoder import ModbusDecoder
 from app.wire.modbus.functions import Function, Phase
 from app.wire.modbus.requests import ReadDictionary, ReadObject, Request, WriteObject
 from app.wire.records import ValueSeen
+from tests.drivers.modbus_rig import turns_of_the_loop
 from tests.drivers.modbus_server import Server, reply, serving
 from tests.drivers.wire import stamper
 
@@ -72,12 +75,6 @@ class Side:
         """A request that has reached the server."""
         task = self.ask(request, timeout_s, urgent)
         return task, await self.held.next()
-
-
-async def turns_of_the_loop() -> None:
-    """Let everything happen that needs no answer."""
-    for _ in range(20):
-        await asyncio.sleep(0)
 
 
 @asynccontextmanager
@@ -259,6 +256,54 @@ async def test_nobody_listens() -> None:
         await side.server.start()
 
 
+@asynccontextmanager
+async def unread() -> AsyncIterator[tuple[ModbusLink, socket.socket]]:
+    """A link to a device that reads nothing by itself and soon takes no more, and the device's end of it."""
+    with socket.socket() as listening:
+        listening.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2048)
+        listening.bind(("127.0.0.1", 0))
+        listening.listen()
+        peer = ModbusPeer(1, "127.0.0.1", listening.getsockname()[1])
+        link = ModbusLink(peer, "modbus0", stamper(), lambda frame: None, lambda error: None)
+        await link.open(PATIENCE_S)
+        device, _ = listening.accept()
+        with device:
+            device.settimeout(PATIENCE_S)
+            try:
+                yield link, device
+            finally:
+                await link.close()
+
+
+@pytest.mark.parametrize("given_up", [False, True])
+async def test_what_a_dead_connection_still_holds_never_arrives(given_up: bool) -> None:
+    """A GO that the device has not taken must not be taken after a STOP on the next connection."""
+    async with unread() as (link, device):
+        for _ in range(40):
+            with pytest.raises(NoAnswerError):
+                await link.request(WriteObject(Address(0x1008), bytes(240)), 0.001)
+        go = asyncio.create_task(link.request(WRITE, 0.01 if given_up else PATIENCE_S))
+        if given_up:
+            with pytest.raises(NoAnswerError):
+                await go
+        else:
+            await turns_of_the_loop()
+        await link.close()
+        await asyncio.gather(go, return_exceptions=True)
+        received = b""
+        with pytest.raises(ConnectionResetError):
+            while data := device.recv(4096):
+                received += data
+        assert received
+        assert WRITE.pdu() not in received
+
+
+async def test_a_connection_that_owes_nothing_is_closed_in_order() -> None:
+    async with unread() as (link, device):
+        await link.close()
+        assert device.recv(100) == b""
+
+
 # -- what is given up ---------------------------------------------------------------
 
 
@@ -340,6 +385,58 @@ async def test_a_device_that_answers_nothing_at_all_is_not_there() -> None:
                 await side.link.request(READ, 0.001)
         with pytest.raises(BusLostError):
             await side.link.request(READ, PATIENCE_S)
+        assert len(side.lost) == 1
+
+
+async def test_a_device_that_leaves_some_unanswered_is_still_there() -> None:
+    async with linked() as side:
+        for _ in range(2 * MAX_UNANSWERED):
+            given_up, _ = await side.asked(READ)
+            given_up.cancel()
+            task, message = await side.asked(READ)
+            side.held.say(reply(message, VALUE))
+            assert await task == VALUE
+        assert side.lost == []
+
+
+async def test_of_those_given_up_the_earliest_are_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(modbus_link, "MAX_REMEMBERED", 2)
+    async with linked() as side:
+        messages = []
+        for _ in range(3):
+            task, message = await side.asked(READ)
+            task.cancel()
+            messages.append(message)
+        side.held.say(reply(messages[1], VALUE) + reply(messages[2], VALUE))
+        task, message = await side.asked(READ)
+        side.held.say(reply(message, VALUE))
+        assert await task == VALUE
+        assert side.link.late == 2
+        task, _ = await side.asked(READ)
+        side.held.say(reply(messages[0], VALUE))
+        with pytest.raises(ProtocolError):
+            await task
+
+
+async def test_a_late_answer_says_nothing_of_what_was_given_up_after_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(modbus_link, "MAX_UNANSWERED", 3)
+    async with linked() as side:
+        messages = []
+        for _ in range(3):
+            task, message = await side.asked(READ)
+            task.cancel()
+            messages.append(message)
+        side.held.say(reply(messages[1], VALUE))
+        while not side.link.late:  # noqa: ASYNC110  nothing tells but the link itself
+            await asyncio.sleep(0.001)
+        for _ in range(2):
+            task, _ = await side.asked(READ)
+            task.cancel()
+        await turns_of_the_loop()
+        assert side.lost == []  # three are unanswered since
+        task, _ = await side.asked(READ)
+        task.cancel()
+        await turns_of_the_loop()
         assert len(side.lost) == 1
 
 

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import asyncio
+
 import pytest
 
-from app.drivers.contract import LinkState
-from app.errors import ModbusExceptionError, OvertakenError, RefusedError
+from app.drivers.contract import LinkState, Written
+from app.errors import ModbusExceptionError, OvertakenError, PdoChangedError, RefusedError
 from app.model.address import Address
 from app.wire.modbus.adu import Message
 from app.wire.modbus.answers import ExceptionAnswer
 from app.wire.modbus.image import WordOrder
-from app.wire.modbus.requests import ReadRegisters, ReadWriteRegisters
+from app.wire.modbus.requests import ReadObject, ReadRegisters, ReadWriteRegisters
 from tests.drivers.modbus_rig import (
     CONTROLWORD,
     GO,
@@ -111,6 +113,94 @@ async def test_a_changed_mapping_is_read_anew() -> None:
         await becomes(driver, LinkState.LOST)
         await becomes(driver, LinkState.CONNECTED)
         assert set(await process.exchange()) == {STATUSWORD}
+
+
+COUNT_TAKEN, COUNT_GIVEN = Address(0x3502, 0), Address(0x3602, 0)
+
+
+async def test_a_mapping_that_is_changed_while_it_is_read_is_read_again() -> None:
+    writing: list[asyncio.Task[Written]] = []
+
+    class Changing(Bad):
+        async def instead(self, message: Message, request: object) -> bytes | None:
+            if isinstance(request, ReadObject) and request.address == COUNT_GIVEN and not writing:
+                writing.append(asyncio.create_task(driver.write(1, COUNT_TAKEN, b"\1")))
+                await asyncio.sleep(0)
+            return None
+
+    changing = Changing(mapped().dictionary)
+    async with small(changing) as (driver, _):
+        images = await driver.process_data(1).images()
+        assert await writing[0] is Written.ACKNOWLEDGED
+        assert set(images.received.places) == {CONTROLWORD}
+
+
+class Slow(Bad):
+    """Answers the reading of an object that is in no mapping as soon as it is released."""
+
+    def __init__(self) -> None:
+        super().__init__(mapped().dictionary)
+        self.release = asyncio.Event()
+
+    async def instead(self, message: Message, request: object) -> bytes | None:
+        if isinstance(request, ReadObject) and request.address == WINDOW:
+            await self.release.wait()
+        return None
+
+
+async def test_registers_are_not_written_by_a_mapping_that_was_changed_before_them() -> None:
+    slow = Slow()
+    async with small(slow) as (driver, _):
+        process = driver.process_data(1)
+        await process.images()
+        reading = asyncio.create_task(driver.read(1, WINDOW))
+        await asyncio.sleep(0)
+        exchanging = asyncio.create_task(process.exchange(VALUES))
+        await asyncio.sleep(0)
+        changing = asyncio.create_task(driver.write(1, COUNT_TAKEN, b"\1"))
+        await asyncio.sleep(0)
+        with pytest.raises(PdoChangedError):
+            await process.exchange(VALUES)
+        slow.release.set()
+        await asyncio.gather(reading, changing)
+        with pytest.raises(PdoChangedError):
+            await exchanging
+        assert slow.count(ReadWriteRegisters) == 0
+        await process.exchange({CONTROLWORD: b"\6\0"})
+        assert slow.dictionary.objects[CONTROLWORD] == b"\6\0"
+
+
+async def test_registers_are_not_written_right_after_the_write_that_changes_what_they_mean() -> None:
+    slow = Slow()
+    async with small(slow) as (driver, _):
+        process = driver.process_data(1)
+        await process.images()
+        reading = asyncio.create_task(driver.read(1, WINDOW))
+        await asyncio.sleep(0)
+        changing = asyncio.create_task(driver.write(1, COUNT_TAKEN, b"\1"))
+        exchanging = asyncio.create_task(process.exchange(VALUES))
+        await asyncio.sleep(0)
+        slow.release.set()
+        await asyncio.gather(reading, changing)
+        with pytest.raises(PdoChangedError):
+            await exchanging
+        assert slow.count(ReadWriteRegisters) == 0
+
+
+async def test_registers_that_were_read_by_a_changed_mapping_are_read_again() -> None:
+    slow = Slow()
+    async with small(slow) as (driver, _):
+        process = driver.process_data(1)
+        assert set(await process.exchange()) > {STATUSWORD}
+        reading = asyncio.create_task(driver.read(1, WINDOW))
+        await asyncio.sleep(0)
+        exchanging = asyncio.create_task(process.exchange())
+        await asyncio.sleep(0)
+        changing = asyncio.create_task(driver.write(1, COUNT_GIVEN, b"\1", urgent=True))
+        await asyncio.sleep(0)
+        slow.release.set()
+        await asyncio.gather(reading, changing)
+        assert set(await exchanging) == {STATUSWORD}
 
 
 async def test_process_data_never_take_a_stop_back() -> None:

@@ -2,19 +2,40 @@
 
 from __future__ import annotations
 
+import asyncio
+from collections.abc import Callable
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta, timezone
 
 import pytest
 
-from app.drivers.modbus_save import Stamp
-from app.errors import NoAnswerError, PreconditionError, SdoAbortError, UsageError
+from app.drivers.contract import Written
+from app.drivers.modbus_save import SPEED, Stamp
+from app.errors import NoAnswerError, PreconditionError, SdoAbortError, UnverifiedError, UsageError
 from app.model.address import Address
 from app.wire.modbus.adu import Message
 from app.wire.modbus.answers import AbortAnswer, ObjectRead
 from app.wire.modbus.requests import ReadObject, WriteObject
 from app.wire.sdo import Abort
-from tests.drivers.modbus_rig import MOMENT, PATIENCE_S, READY_TO_SWITCH_ON, SAVE_TUNING, STATUSWORD, UPTIME, Bad, small
-from tests.drivers.modbus_server import Dictionary, Server, reply
+from tests.drivers.modbus_rig import (
+    CONTROLWORD,
+    FOUR,
+    GO,
+    MOMENT,
+    PATIENCE_S,
+    READY_TO_SWITCH_ON,
+    SAVE_TUNING,
+    STATUSWORD,
+    STOP,
+    TARGET,
+    UPTIME,
+    WINDOW,
+    Bad,
+    mapped,
+    small,
+    turns_of_the_loop,
+)
+from tests.drivers.modbus_server import PD4E, Dictionary, Server, reply
 
 
 @pytest.mark.parametrize(
@@ -94,6 +115,118 @@ async def test_an_axis_that_is_started_meanwhile_is_not_saved() -> None:
         with pytest.raises(PreconditionError):
             await driver.save(1, "tuning")
         assert starting.saves == []
+
+
+class AtLastLook(Saving):
+    """``then`` is called while the last standstill is being read, right before the save order."""
+
+    def __init__(self, then: Callable[[], None], polls: int = 0) -> None:
+        super().__init__(polls)
+        self.then = then
+        self.looks = 0
+
+    async def instead(self, message: Message, request: object) -> bytes | None:
+        if isinstance(request, ReadObject) and request.address == SPEED:
+            self.looks += 1
+            if self.looks == 2:
+                self.then()
+                await turns_of_the_loop()
+        return await super().instead(message, request)
+
+
+async def test_a_write_that_waits_behind_the_last_look_at_the_standstill_starts_no_motor() -> None:
+    going: list[asyncio.Task[Written]] = []
+
+    def go() -> None:
+        going.append(asyncio.create_task(driver.write(1, CONTROLWORD, GO)))
+
+    saving = AtLastLook(go, polls=2)
+    async with small(saving) as (driver, _):
+        await driver.save(1, "tuning")
+        with pytest.raises(PreconditionError) as caught:
+            await going[0]
+        assert caught.value.details["address"] == CONTROLWORD.short
+        assert CONTROLWORD not in [address for address, _ in saving.dictionary.written]
+        assert saving.saves == [b"save"]
+
+
+async def test_a_stop_at_the_last_look_goes_before_the_save_and_the_look_is_taken_again() -> None:
+    stopping: list[asyncio.Task[Written]] = []
+
+    def stop() -> None:
+        stopping.append(asyncio.create_task(driver.write(1, CONTROLWORD, STOP, urgent=True)))
+
+    saving = AtLastLook(stop)
+    async with small(saving) as (driver, _):
+        await driver.save(1, "tuning")
+        assert await stopping[0] is Written.ACKNOWLEDGED
+        asked = [each.address for each in saving.seen if isinstance(each, ReadObject | WriteObject)]
+        stopped = asked.index(CONTROLWORD)
+        assert asked[stopped : stopped + 5] == [CONTROLWORD, STATUSWORD, Address(0x6044), SPEED, SAVE_TUNING]
+        assert saving.saves == [b"save"]
+
+
+async def test_until_the_save_has_ended_nothing_but_what_is_urgent_can_move_the_axis() -> None:
+    class Held(Saving):
+        def __init__(self) -> None:
+            super().__init__(polls=1)
+            self.polled, self.release = asyncio.Event(), asyncio.Event()
+            for address, data in mapped().dictionary.objects.items():
+                if address.major in (0x3502, 0x3602):
+                    self.dictionary.objects[address] = data
+
+        async def instead(self, message: Message, request: object) -> bytes | None:
+            if isinstance(request, ReadObject) and request.address == SAVE_TUNING and self.saves:
+                self.polled.set()
+                self.polls = 0 if self.release.is_set() else 1
+            return await super().instead(message, request)
+
+    held = Held()
+    async with small(held) as (driver, _):
+        saving = asyncio.create_task(driver.save(1, "tuning"))
+        await asyncio.wait_for(held.polled.wait(), PATIENCE_S)
+        with pytest.raises(PreconditionError):
+            await driver.write(1, TARGET, bytes(4))
+        with pytest.raises(PreconditionError):
+            await driver.process_data(1).exchange({CONTROLWORD: GO})
+        assert await driver.process_data(1).exchange()
+        assert await driver.write(1, WINDOW, FOUR) is Written.ACKNOWLEDGED
+        assert await driver.write(1, CONTROLWORD, STOP, urgent=True) is Written.ACKNOWLEDGED
+        held.release.set()
+        await saving
+        assert await driver.write(1, CONTROLWORD, GO) is Written.ACKNOWLEDGED
+        assert [data for address, data in held.dictionary.written if address == CONTROLWORD] == [STOP, GO]
+
+
+class Busy(Saving):
+    """Once it was told to save, its entry is refused so often."""
+
+    def __init__(self, refusals: int) -> None:
+        super().__init__(0)
+        self.refusals = refusals
+
+    async def instead(self, message: Message, request: object) -> bytes | None:
+        if isinstance(request, ReadObject) and request.address == SAVE_TUNING and self.saves:
+            self.refusals -= 1
+            if self.refusals >= 0:
+                return reply(message, AbortAnswer(Abort.DEVICE_STATE))
+        return await super().instead(message, request)
+
+
+async def test_a_device_that_refuses_to_be_asked_while_it_saves_has_not_refused_the_save() -> None:
+    busy = Busy(refusals=3)
+    async with small(busy) as (driver, _):
+        await driver.save(1, "tuning")
+        assert busy.refusals == -1
+
+
+async def test_a_save_whose_end_is_not_told_in_time_is_unverified() -> None:
+    commands = tuple(replace(command, timeout_s=0.2) for command in PD4E.save)
+    async with small(Busy(refusals=1000)) as (driver, _):
+        driver.set_description(1, replace(PD4E, save=commands))
+        with pytest.raises(UnverifiedError):
+            await driver.save(1, "tuning")
+        assert await driver.write(1, CONTROLWORD, GO) is Written.ACKNOWLEDGED
 
 
 async def test_a_device_with_fewer_categories_is_not_told_to_save_one_that_it_has_not() -> None:

@@ -23,7 +23,6 @@ from app.wire.modbus.functions import (
 )
 from app.wire.modbus.requests import (
     CANOPEN_NODE,
-    MAX_OBJECT_DATA,
     ReadArray,
     ReadDictionary,
     ReadObject,
@@ -35,13 +34,12 @@ from app.wire.modbus.requests import (
     WriteRegister,
     WriteRegisters,
     object_head,
+    object_pdu,
     read_data,
     read_object_head,
     read_phase,
 )
 from app.wire.records import Fault
-
-_READ, _WRITE = 0, 1
 
 
 class RegistersRead(NamedTuple):
@@ -88,8 +86,7 @@ class ObjectRead(NamedTuple):
 
     def pdu(self) -> bytes:
         """Bytes of the PDU. Raises ValueError where the data are too long."""
-        count = checked(len(self.data), 0, MAX_OBJECT_DATA, "number of bytes")
-        return object_head(_READ, self.node, self.address, self.start, count) + self.data
+        return object_pdu(self.node, self.address, self.start, self.data, write=False)
 
 
 class ObjectWritten(NamedTuple):
@@ -106,7 +103,7 @@ class ObjectWritten(NamedTuple):
 
     def pdu(self) -> bytes:
         """Bytes of the PDU."""
-        return object_head(_WRITE, self.node, self.address, self.start, 0)
+        return object_head(self.node, self.address, self.start, 0, write=True)
 
 
 class FramesRead(NamedTuple):

@@ -28,6 +28,8 @@ _CLOCK_SLACK: Final = 1000
 """One part in so many that the device's clock may be slow."""
 _FRESH_NS: Final = 1_000_000_000
 """Registers and an object tell the order of words only where they are read so soon after each other."""
+_MAX_CLIENTS: Final = 1024
+"""So many are known as seen before, the latest ones."""
 
 
 class DeviceWatch:
@@ -38,7 +40,9 @@ class DeviceWatch:
         self.received = MappingObjects(RX_MAPPING, RX_REGISTER)
         self.sent = MappingObjects(TX_MAPPING, TX_REGISTER)
         self._uptime: tuple[int, int] | None = None
-        self._told_to_boot: str | None = None
+        self._clients: dict[str, None] = {}
+        self._told_to_boot: frozenset[str] | None = None
+        """The clients that were seen before it was told to, and who told it."""
         self._registers: tuple[int, int, tuple[int, ...]] | None = None
 
     def forget(self) -> None:
@@ -49,8 +53,12 @@ class DeviceWatch:
 
     def asked(self, request: Request, client: str) -> None:
         """A request was sent to it."""
+        self._clients.pop(client, None)
+        self._clients[client] = None
+        if len(self._clients) > _MAX_CLIENTS:
+            del self._clients[next(iter(self._clients))]
         if _tells_to_boot(request):
-            self._told_to_boot = client
+            self._told_to_boot = frozenset(self._clients)
 
     def refused(self, request: Request) -> None:
         """It has refused a request."""
@@ -66,8 +74,8 @@ class DeviceWatch:
                 self._forget(frame.address)
 
     def back(self, t_ns: int, bus: str, client: str) -> Sequence[Record]:
-        """It has answered ``client``. A connection does not outlive a restart: another one shows that it is over."""
-        if self._told_to_boot is None or self._told_to_boot == client:
+        """It has answered ``client``. A connection does not outlive a restart: a new one shows that it is over."""
+        if self._told_to_boot is None or client in self._told_to_boot:
             return ()
         return self._restarted(t_ns, bus)
 
@@ -128,7 +136,8 @@ class DeviceWatch:
             "sent": self.sent.snapshot(),
             "order": None if order is None else order.value,
             "uptime": self._uptime,
-            "told_to_boot": self._told_to_boot,
+            "clients": list(self._clients),
+            "told_to_boot": None if self._told_to_boot is None else sorted(self._told_to_boot),
             "registers": self._registers,
         }
 
@@ -138,7 +147,8 @@ class DeviceWatch:
         self.sent.restore(state["sent"])
         self.sent.order = self.received.order = None if state["order"] is None else WordOrder(state["order"])
         self._uptime = None if state["uptime"] is None else (state["uptime"][0], state["uptime"][1])
-        self._told_to_boot = state["told_to_boot"]
+        self._clients = dict.fromkeys(state["clients"])
+        self._told_to_boot = None if state["told_to_boot"] is None else frozenset(state["told_to_boot"])
         read = state["registers"]
         self._registers = None if read is None else (read[0], read[1], tuple(read[2]))
 

@@ -96,7 +96,7 @@ class ProcessImage:
             raw = values[address]
             if len(raw) != stop - start:
                 raise ValueError(f"{address.short} has {len(raw)} bytes where {stop - start} are mapped")
-            turned = self._turned(raw[::-1], start)
+            turned = self._turned(raw[::-1], start) if any(raw) else raw  # 0 is the same in any order
             if turned is None:
                 raise ValueError(f"which register of {address.short} comes first is not known")
             data[start:stop] = turned
@@ -104,6 +104,8 @@ class ProcessImage:
 
     def _turned(self, data: bytes, start: int) -> bytes | None:
         """Most significant byte first to the order of registers, and back. None where that order is not known."""
+        if self.order is None and len(data) > 2 and (len(data) % 2 or start % 2):
+            return None  # it shares registers with its neighbours
         if self.order is WordOrder.HIGH_FIRST or len(data) % 2 or start % 2:
             return data
         turned = bytes_of(words_of(data)[::-1])

@@ -99,7 +99,8 @@ class ReadObject(NamedTuple):
 
     def pdu(self) -> bytes:
         """Bytes of the PDU. Raises ValueError where a field is out of range."""
-        return object_head(_READ, self.node, self.address, self.start, checked(self.size, 0, MAX_WORD, "size"))
+        size = checked(self.size, 0, MAX_WORD, "size")
+        return object_head(self.node, self.address, self.start, size, write=False)
 
 
 class WriteObject(NamedTuple):
@@ -117,8 +118,7 @@ class WriteObject(NamedTuple):
 
     def pdu(self) -> bytes:
         """Bytes of the PDU. Raises ValueError where a field is out of range or the data are too long."""
-        count = checked(len(self.data), 0, MAX_OBJECT_DATA, "number of bytes")
-        return object_head(_WRITE, self.node, self.address, self.start, count) + self.data
+        return object_pdu(self.node, self.address, self.start, self.data, write=True)
 
 
 class ReadDictionary(NamedTuple):
@@ -201,8 +201,15 @@ def decode_request(pdu: bytes, base: int = HEADER_SIZE) -> Request:
     return request
 
 
-def object_head(control: int, node: int, address: Address, start: int, count: int) -> bytes:
+def object_pdu(node: int, address: Address, start: int, data: bytes, *, write: bool) -> bytes:
+    """A request or answer of FC 43 with data. Raises ValueError where a field is out of range or they are too long."""
+    count = checked(len(data), 0, MAX_OBJECT_DATA, "number of bytes")
+    return object_head(node, address, start, count, write=write) + data
+
+
+def object_head(node: int, address: Address, start: int, count: int, *, write: bool) -> bytes:
     """Requests and answers of FC 43 up to their data."""
+    control = _WRITE if write else _READ
     head = bytes((Function.OBJECT, MEI_CANOPEN, control, 0, checked(node, 0, 0xFF, "node")))
     tail = bytes_of((checked(start, 0, MAX_WORD, "start"), count))
     return head + address.major.to_bytes(2, "big") + bytes((address.minor,)) + tail

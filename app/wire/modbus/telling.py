@@ -64,10 +64,10 @@ class Teller:
             value = ValueSeen(t_ns, self.bus, node, request.address, answer.data, Source.SDO_READ)
             return [seen] if request.start else [seen, value]
         if isinstance(request, WriteObject):
-            return self._written(node, t_ns, asked, request.address, request.data, whole=request.start == 0)
+            return self._written(node, t_ns, asked, request, request.address, request.data, whole=request.start == 0)
         if isinstance(request, WriteArray):
             frames = request.frames
-            return [r for f in frames for r in self._written(node, t_ns, asked, f.address, f.data, whole=True)]
+            return [r for f in frames for r in self._written(node, t_ns, asked, request, f.address, f.data, whole=True)]
         return [self._transaction(node, t_ns, asked, Outcome.DONE), *self._values(node, t_ns, asked, request, answer)]
 
     def _values(self, node: int, t_ns: int, asked: Open, request: Request, answer: Answer) -> list[Record]:
@@ -93,9 +93,13 @@ class Teller:
                     records += [ValueSeen(t_ns, bus, node, address, data, Source.PDO_TX) for address, data in whole]
         return records
 
-    def _written(self, node: int, t_ns: int, asked: Open, address: Address, data: bytes, whole: bool) -> list[Record]:
+    def _written(
+        self, node: int, t_ns: int, asked: Open, request: Request, address: Address, data: bytes, whole: bool
+    ) -> list[Record]:
+        """``whole``: all of the object. Of one that was written in part nobody knows what it is now."""
         seen = self._transfer(node, t_ns, asked, address, Outcome.DONE if whole else Outcome.BROKEN, data)
         if not whole:
+            self._device(node).unsure(request)
             return [seen]
         value = ValueSeen(t_ns, self.bus, node, address, data, Source.SDO_WRITE)
         return [seen, value, *self._commanded(node, t_ns, address, data, done=True)]

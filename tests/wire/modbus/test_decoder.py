@@ -391,6 +391,34 @@ def test_a_device_that_was_told_to_restart_is_back_on_a_new_connection(mapped: M
     ]
 
 
+def test_an_answer_to_a_client_that_was_there_before_shows_no_restart(mapped: ModbusDecoder) -> None:
+    """It is answered on its old connection until the device really goes."""
+    earlier, client, later = Client(OTHER, ours=False), Client(), Client("10.0.0.9:41001", ours=False)
+    mapped.feed_all(earlier.exchange(READ, READ_ANSWER))
+    mapped.feed_all(client.exchange(BOOT, ObjectWritten(BOOT.address)))
+    assert RestartSeen not in {type(record) for record in mapped.feed_all(earlier.exchange(READ, READ_ANSWER))}
+    assert mapped.image(NODE, sent_by_device=True) is not None
+    restored = ModbusDecoder(BUS, {SERVER: NODE})
+    restored.restore(json.loads(json.dumps(mapped.snapshot())))
+    for decoder in (mapped, restored):
+        assert RestartSeen not in {type(record) for record in decoder.feed_all(earlier.exchange(READ, READ_ANSWER))}
+        assert RestartSeen in {type(record) for record in decoder.feed_all(later.exchange(READ, READ_ANSWER))}
+
+
+def test_of_very_many_clients_the_earliest_are_forgotten(mapped: ModbusDecoder) -> None:
+    for number in range(2000):
+        mapped.feed_all(Client(f"10.0.0.9:{number}", ours=False).exchange(READ, READ_ANSWER))
+    assert len(mapped.snapshot()["devices"][str(NODE)]["clients"]) == 1024
+
+
+def test_a_mapping_that_was_written_in_part_is_not_known(mapped: ModbusDecoder) -> None:
+    entry = WriteObject(Address(0x3602, 1), b"\x64\x60", start=2)
+    assert mapped.image(NODE, sent_by_device=True) is not None
+    records = mapped.feed_all(Client().exchange(entry, ObjectWritten(entry.address, start=2)))
+    assert [(seen.address, seen.outcome) for seen in transfers(records)] == [(entry.address, Outcome.BROKEN)]
+    assert mapped.image(NODE, sent_by_device=True) is None
+
+
 def test_a_refused_restart_is_none(mapped: ModbusDecoder) -> None:
     mapped.feed_all(Client().exchange(BOOT, AbortAnswer(0x08000022)))
     records = mapped.feed_all(Client(OTHER, ours=False).exchange(READ, READ_ANSWER))
@@ -504,7 +532,7 @@ def test_the_live_state_of_a_device(mapped: ModbusDecoder) -> None:
     node = live.node(BUS, NODE)
     assert node is not None
     assert (node.other_client_ns, node.boots) == (client.t_ns, 0)
-    read = Client().at(client.t_ns).exchange(ReadObject(window, 4), ObjectRead(window, b"\1\0\0\0"))
+    read = Client("10.0.0.1:40001").at(client.t_ns).exchange(ReadObject(window, 4), ObjectRead(window, b"\1\0\0\0"))
     live.apply_all(mapped.feed_all(read))
     view, node = live.value(BUS, NODE, window), live.node(BUS, NODE)
     assert view is not None

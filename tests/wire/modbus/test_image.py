@@ -79,6 +79,19 @@ def test_without_a_known_order_no_value_is_guessed() -> None:
     assert unknown.registers(values | {POSITION: b"\1\0\1\0"})[2:4] == (1, 1)  # it makes no difference here
 
 
+def test_without_a_known_order_a_long_value_at_an_odd_byte_is_not_guessed_either() -> None:
+    shifted = (0x60610008, 0x60640020, 0x60440010, 0x60600008)
+    unknown, known = process_image(5000, shifted), process_image(5000, shifted, WordOrder.HIGH_FIRST)
+    registers = (0x0200, 0x0102, 0x03FF, 0xFE06)
+    found = dict(known.values(5000, registers))
+    assert found[POSITION] == (0x00010203).to_bytes(4, "little")
+    assert found.pop(POSITION) not in dict(unknown.values(5000, registers)).values()
+    assert dict(unknown.values(5000, registers)) == found
+    with pytest.raises(ValueError, match="6064"):
+        unknown.registers({**found, POSITION: b"\3\2\1\0"})
+    assert unknown.registers({**found, POSITION: bytes(4)}) == (0x0200, 0, 0x00FF, 0xFE06)
+
+
 def test_the_device_shows_its_order() -> None:
     position = (0x00010203).to_bytes(4, "little")
     assert shown_order(position, (0x0001, 0x0203)) is WordOrder.HIGH_FIRST
