@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import os
 import shutil
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, Final
 
-from playwright.sync_api import Browser, BrowserContext, ViewportSize, expect
+from playwright.sync_api import Browser, BrowserContext, Page, ViewportSize, expect
 
 SIZE: Final[ViewportSize] = {"width": 1366, "height": 768}
 WAIT_MS: Final = 30_000
@@ -36,3 +37,16 @@ def signed_in(browser: Browser, url: str, **options: Any) -> Iterator[BrowserCon
     first.close()
     yield context
     context.close()
+
+
+def answer_of(page: Page, asked: str, arg: Any = None, timeout_ms: float = WAIT_MS) -> Any:
+    """What an asynchronous function of the page gives, once that is true. Raises TimeoutError.
+
+    For what the page must fetch: ``wait_for_function`` takes every promise for true.
+    """
+    end_s = time.monotonic() + timeout_ms / 1000
+    while not (answer := page.evaluate(asked, arg)):
+        if time.monotonic() > end_s:
+            raise TimeoutError(f"not true within {timeout_ms / 1000:.0f} s: {asked}")
+        page.wait_for_timeout(50)
+    return answer

@@ -16,6 +16,7 @@ from playwright.sync_api import Browser, Locator, Page, expect
 from app.model.address import Address
 from app.model.datatypes import Raw
 from app.model.sets import dump_set, load_set
+from tests.e2e.browser import answer_of
 from tests.e2e.processes import running
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(300)]
@@ -86,9 +87,10 @@ def home(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Iterator
         page.goto(f"{url}&scene=off")
         expect(page.get_by_test_id("mode")).to_be_visible(timeout=WAIT_MS)
         home = Home(url.split("?")[0], page)
-        page.wait_for_function(
+        answer_of(
+            page,
             """async () => (await (await fetch("/api/sets?tag=as-found")).json()).records.length === 6""",
-            timeout=WAIT_MS,
+            timeout_ms=WAIT_MS,
         )
         home.write(TWO, "3110:01", 510)
         home.write(TWO, "3201:04", 0x0005)

@@ -13,6 +13,7 @@ from typing import Any, Final
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Locator, Page, expect
 
+from tests.e2e.browser import answer_of
 from tests.e2e.processes import ROOT, Process, running
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(300)]
@@ -406,11 +407,12 @@ def test_after_a_restart_of_the_server_it_is_open_again_at_the_same_moment(brows
     port = first.address.rsplit(":", 1)[1].strip("/")
     with serving(browser, tmp_path, command="serve", port=port, context=first.context) as second:
         expect(page.get_by_test_id("deaf")).to_be_hidden(timeout=WAIT_MS)
-        page.wait_for_function(
+        answer_of(
+            page,
             """(wanted) => fetch('/api/replay').then((answer) => answer.json()).then(
               (all) => all.length === 1 && Math.abs(all[0].cursor.t_ns - wanted) < 2000)""",
-            arg=start + 33 * S,
-            timeout=WAIT_MS,
+            start + 33 * S,
+            WAIT_MS,
         )
         expect_at(page, start + 33 * S)
         expect(angle(page, 2)).to_have_text(shown)

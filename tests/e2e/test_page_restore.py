@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Page, expect
 
-from tests.e2e.browser import SIZE, WAIT_MS
+from tests.e2e.browser import SIZE, WAIT_MS, answer_of
 from tests.e2e.conftest import Twins
 from tests.e2e.processes import running
 from tests.e2e.test_browser import hold
@@ -55,15 +55,16 @@ def api(page: Page, method: str, path: str, body: object = None) -> Any:
 
 def found_sets(page: Page) -> str:
     """Ids of the sets of blade 1, once they are in the library."""
-    found: list[str] = page.wait_for_function(
+    found: list[str] = answer_of(
+        page,
         """async (station) => {
             const records = (await (await fetch("/api/sets")).json()).records;
             const own = ["pmm", "pmc"].map((name) => records.find((one) => one.origin.device === `${station}/${name}`));
             return own.every(Boolean) && own.map((one) => one.id);
         }""",
-        arg=SOURCE,
-        timeout=RUN_MS,
-    ).json_value()
+        SOURCE,
+        RUN_MS,
+    )
     return ",".join(found)
 
 
@@ -85,9 +86,7 @@ def disturb(page: Page, changes: tuple[tuple[str, str, int], ...] = CHANGED) -> 
 def ram(page: Page, slug: str, address: str) -> object:
     """What the device answers when it is read now."""
     job = api(page, "POST", f"/api/live/devices/{slug}/read", {"addresses": [address]})
-    page.wait_for_function(
-        "async (id) => (await (await fetch(`/api/live/jobs/${id}`)).json()).state !== 'running'", arg=job["id"]
-    )
+    answer_of(page, "async (id) => (await (await fetch(`/api/live/jobs/${id}`)).json()).state !== 'running'", job["id"])
     both = api(page, "POST", "/api/compare", {"columns": [f"live:{slug}", f"default:{slug}"]})
     return next(row["cells"][0]["raw"] for row in both["rows"] if row["address"] == address)
 
@@ -254,10 +253,11 @@ def test_a_restore_that_was_cut_off_is_told_on_every_page_and_taken_back(
         disturb(page, ((PMM, "3110:01", 480),))
         plan = passing_plan(page, order)
         begun = api(page, "POST", "/api/live/restore", {**order, "plan_hash": plan["hash"]})
-        page.wait_for_function(
+        answer_of(
+            page,
             "async (id) => (await (await fetch(`/api/live/restores/${id}`)).json()).state === 'awaiting-confirmation'",
-            arg=begun["id"],
-            timeout=RUN_MS,
+            begun["id"],
+            RUN_MS,
         )
         server.popen.kill()
         server.popen.wait()

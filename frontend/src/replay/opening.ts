@@ -70,9 +70,8 @@ export function useOpening(channel: Channel, id: string | undefined): Replay | n
       setOffered(offer);
       setSettled(doc.id);
     };
-    settle(doc, channel.store.cursor?.t_ns ?? null, linked()).then(told, (error: unknown) =>
-      tellFailed(error),
-    );
+    const settling = channel.store.cursor === null ? settle(doc, linked()) : Promise.resolve(null);
+    settling.then(told, (error: unknown) => tellFailed(error));
     // Once for every time that it was opened.
     // eslint-disable-next-line react-hooks/exhaustive-deps
   }, [dataUpdatedAt]);
@@ -99,15 +98,14 @@ export function useOpening(channel: Channel, id: string | undefined): Replay | n
 const placeOf = (tNs: number): number | null => (tNs >= 0 && tNs <= LATEST_NS ? tNs : null);
 
 /**
- * Puts the cursor where this page was before, or where its link points. Where others look at the replay already nothing is
+ * Puts the cursor where the link of a page that has just come points. Where others look at the replay already nothing is
  * moved: gives the place that the link names, to be offered.
  */
-async function settle(doc: ReplayDoc, beforeNs: number | null, linkedNs: number): Promise<number | null> {
-  const wanted = beforeNs ?? linkedNs;
-  if (!Number.isFinite(wanted) || Math.abs(wanted - doc.cursor.t_ns) < SAME_NS) return null;
-  if (doc.watchers > 0) return beforeNs === null ? wanted : null;
+async function settle(doc: ReplayDoc, linkedNs: number): Promise<number | null> {
+  if (!Number.isFinite(linkedNs) || Math.abs(linkedNs - doc.cursor.t_ns) < SAME_NS) return null;
+  if (doc.watchers > 0) return linkedNs;
   if (doc.cursor.playing) await orderCursor(doc.id, { action: "pause" });
-  await orderCursor(doc.id, { action: "seek", t_ns: Math.round(wanted) });
+  await orderCursor(doc.id, { action: "seek", t_ns: Math.round(linkedNs) });
   return null;
 }
 
