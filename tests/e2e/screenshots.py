@@ -59,8 +59,8 @@ SHOTS: Final = (
     Shot("axis-ladder", f"{SETUP}ladder", "[data-testid=picture-ladder]"),
     Shot("axis-battery", f"{SETUP}battery", "[data-testid=battery-picture]"),
     Shot("axis-gear", f"{SETUP}gear", "[data-testid=gear-picture]"),
-    Shot("axis-scope", "/axis?blade=1&tab=scope", "[data-testid=chosen-signals]"),
-    Shot("axis-pdo", "/axis?blade=1&tab=pdo", "[data-testid=pdo-close], [data-testid^=pdo-]"),
+    Shot("axis-scope", "/axis?blade=1&tab=scope", "[data-testid=arm]"),
+    Shot("axis-pdo", "/axis?blade=1&tab=pdo", "main [data-testid^=pdo-]:visible"),
     Shot("parameters", "/parameters?device=wtg-07/blade-1/pmm", "main [data-testid^='value-']"),
     Shot(
         "parameters-side",
