@@ -103,8 +103,8 @@ class Running:
     over: asyncio.Event = field(default_factory=asyncio.Event)
 
     def end(self, why: Ended) -> None:
-        """It ends now, for the first reason that there was."""
-        if self.why is None:
+        """It ends now, for the first reason that there was; what was done, and then failed to come to rest, failed."""
+        if self.why is None or (self.why is Ended.DONE and why is Ended.FAILED):
             self.why = why
         self.over.set()
 

@@ -22,7 +22,7 @@ from app.service.motion.self_tests import Testing, look_at_tests
 from app.service.restore.precheck import MASTER_QUIET_NS
 from app.service.rule_check import check_live
 from app.service.stop import is_axis
-from app.service.views import AxisLine, axis_lines
+from app.service.views import STALE_NS, AxisLine, axis_lines
 
 POSITION: Final = Address(0x6064)
 ASK_TIMEOUT_S: Final = 0.5
@@ -124,8 +124,12 @@ def _masters(link: BusLink, now_ns: int) -> Standing:
 
 
 async def _ask_others(connection: Connection, target: Target) -> None:
-    """A blade that does not answer stays not known: that holds back too."""
-    lines = axis_lines(connection.turbine, {one.slug: one for one in connection.targets}, connection.stamper())
+    """A blade that does not answer stays not known: that holds back too.
+
+    Asked are also those whose angle would grow old while the units are asked what they test.
+    """
+    soon_ns = connection.stamper() + STALE_NS // 2
+    lines = axis_lines(connection.turbine, {one.slug: one for one in connection.targets}, soon_ns)
     stale = {line.station for line in lines if line.stale} - {station_slug(target.slug)}
     asked = [one for one in connection.targets if station_slug(one.slug) in stale and is_axis(one)]
     await asyncio.gather(

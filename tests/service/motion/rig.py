@@ -103,6 +103,6 @@ async def number(connection: Connection, address: Address, slug: str = AXIS) -> 
     return int.from_bytes(data, "little", signed=address in (POSITION,))
 
 
-async def angle_deg(connection: Connection) -> float:
+async def angle_deg(connection: Connection, slug: str = AXIS) -> float:
     """Where the blade is."""
-    return await number(connection, POSITION) / 100
+    return await number(connection, POSITION, slug) / 100

@@ -12,10 +12,12 @@ from app.model.texts import error_text, load_texts
 from app.service.battery.conditions import Condition
 from app.service.battery.objects import TEST_STATUS, TestStatus, read_number
 from app.service.connection import Connection
+from app.service.devices import Target
+from app.service.motion import interlocks
 from app.service.motion.desk import MotionDesk
 from app.service.motion.interlocks import Interlock, Standing
 from app.service.motion.moves import jog
-from app.service.motion.self_tests import Testing, battery, pulsed
+from app.service.motion.self_tests import Testing, Tests, battery, look_at_tests, pulsed
 from app.store.store import Store
 from app.twins.line import Fault, drop
 from tests.e2e.test_interoperation import until
@@ -184,6 +186,21 @@ async def test_nothing_moves_while_an_input_of_the_safety_chain_is_tested(
         assert "X13.8" in error_text(load_texts("de"), error)
         await cleared(motion, Interlock.INPUT_TEST, 2 * SHOWN_S)
         await motion.require_clear(AXIS)
+
+
+async def test_an_angle_does_not_grow_old_while_the_units_are_asked(
+    connection: Connection, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def slowly(connection: Connection, target: Target) -> Tests:
+        await asyncio.sleep(0.6)
+        return await look_at_tests(connection, target)
+
+    async with at_the_desk(connection) as (motion, _):
+        monkeypatch.setattr(interlocks, "look_at_tests", slowly)
+        for slug in ("wtg-07/blade-2/pmc", "wtg-07/blade-3/pmc"):
+            await angle_deg(connection, slug)
+        await asyncio.sleep(0.6)
+        assert not (await standing(motion, Interlock.OTHERS_FEATHERED)).holds_back
 
 
 async def test_a_unit_that_does_not_answer_holds_its_axis_back(served: Served, connection: Connection) -> None:
