@@ -65,7 +65,7 @@ def test_what_holds_up_our_own_code_is_none(watcher: Watcher) -> None:
 @pytest.mark.parametrize(("stands", "passes"), [(True, True), (False, False)])
 def test_only_a_failure_with_a_standstill_is_run_once_more(tmp_path: Path, stands: bool, passes: bool) -> None:
     (tmp_path / "test_once.py").write_text(FAILS_ONCE.format(stands=stands))
-    command = [sys.executable, "-m", "pytest", "-p", "tests.standstill", "-p", "no:cacheprovider", tmp_path]
+    command = [sys.executable, "-m", "pytest", "-p", "tests.standstill", "-p", "no:cacheprovider", str(tmp_path)]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=60, check=False)
     assert (done.returncode == 0) is passes, done.stdout
     assert ("1 rerun" in done.stdout) is passes

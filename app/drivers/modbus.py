@@ -111,6 +111,8 @@ class ModbusDriver:
     def status(self) -> DriverStatus:
         """The worst state of those devices that were reached at all; other masters cannot be seen."""
         devices = list(self._devices.values())
+        if not devices:
+            return DriverStatus(self.bus, LinkState.CLOSED, 0, "", 0, 0, ())
         reached = [device for device in devices if device.state is not LinkState.CLOSED] or devices
         worst = next((device for device in reached if device.state is not LinkState.CONNECTED), reached[0])
         reconnects = sum(device.reconnects for device in devices)

@@ -6,8 +6,8 @@ import re
 from typing import Final, NamedTuple
 
 from app.errors import UsageError
+from app.model.servers import PORT, Server, parse_server
 
-DEFAULT_PORT: Final = 502
 MAX_NODE: Final = 247
 """As many as Modbus can number."""
 
@@ -17,13 +17,13 @@ class ModbusPeer(NamedTuple):
 
     node: int
     host: str
-    port: int = DEFAULT_PORT
+    port: int = PORT
     unit: int = 0
 
     @property
     def server(self) -> str:
         """``host:port``, as it stands in frames."""
-        return f"[{self.host}]:{self.port}" if ":" in self.host else f"{self.host}:{self.port}"
+        return Server(self.host, self.port, self.unit).text
 
 
 class ModbusConfig(NamedTuple):
@@ -36,9 +36,7 @@ class ModbusConfig(NamedTuple):
         return ",".join(f"{peer.server}/{peer.unit}={peer.node}" for peer in self.peers)
 
 
-_PEER: Final = re.compile(
-    r"(?P<host>\[[0-9A-Fa-f:.]+\]|[A-Za-z0-9._-]+)(:(?P<port>[0-9]{1,5}))?(/(?P<unit>[0-9]{1,3}))?(=(?P<node>[0-9]{1,3}))?"
-)
+_PEER: Final = re.compile(r"(?P<server>[^=]+)(=(?P<node>[0-9]{1,3}))?")
 
 
 def parse_modbus(text: str) -> ModbusConfig:
@@ -58,15 +56,14 @@ def _peer(text: str, part: str, place: int) -> ModbusPeer:
     match = _PEER.fullmatch(part)
     if match is None:
         raise _wrong(text, f"'{part}' is not HOST[:PORT][/UNIT][=NODE]")
-    port, unit = int(match["port"] or DEFAULT_PORT), int(match["unit"] or 0)
+    try:
+        server = parse_server(match["server"])
+    except ValueError as error:
+        raise _wrong(text, str(error)) from error
     node = int(match["node"] or place)
-    if not 0 < port < 65536:
-        raise _wrong(text, f"port {port} is not within 1 to 65535")
-    if unit > 255:
-        raise _wrong(text, f"unit {unit} is not within 0 to 255")
     if not 1 <= node <= MAX_NODE:
         raise _wrong(text, f"node {node} is not within 1 to {MAX_NODE}")
-    return ModbusPeer(node, match["host"].strip("[]"), port, unit)
+    return ModbusPeer(node, *server)
 
 
 def _wrong(text: str, reason: str) -> UsageError:

@@ -10,6 +10,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from app.errors import SiteError
+from app.model.description import Bus
+from app.model.servers import MODBUS, Server, parse_range, parse_server
 
 SCHEMA: Final = 1
 HEARTBEAT_NODE: Final = 126
@@ -22,23 +24,43 @@ class BusConfig:
     """One bus of a turbine: its name in recordings, the adapter (``socketcand:127.0.0.1:29536``) and the bit rate.
 
     ``heartbeat_node`` is the number under which this tool beats while axes are moved; no device may have it.
+    ``modbus-tcp`` as the connection: its devices have addresses of their own, all within ``ranges``, and there is no
+    bit rate (0).
     """
 
     name: str
     connection: str
     bitrate: int
     heartbeat_node: int = HEARTBEAT_NODE
+    ranges: tuple[str, ...] = ()
+
+    @property
+    def kind(self) -> Bus:
+        """What is spoken on it."""
+        return Bus.MODBUS_TCP if self.connection == MODBUS else Bus.CANOPEN
 
 
 @dataclass(frozen=True, slots=True)
 class Device:
-    """One device of a station. ``slug`` is the whole path, as used in addresses, sets and audit."""
+    """One device of a station. ``slug`` is the whole path, as used in addresses, sets and audit.
+
+    ``address`` is where it listens on a Modbus TCP bus (``HOST[:PORT][/UNIT]``); on others it is empty.
+    ``external_stop`` names what stops this axis by hand when the tool cannot: without it one that is no twin is not
+    moved where its bus cannot prove that it stops by itself.
+    """
 
     slug: str
     name: str
     description_id: str
     bus: str
     node: int
+    address: str = ""
+    external_stop: str = ""
+
+    @property
+    def server(self) -> Server:
+        """Where it listens. Raises ValueError where it has no address."""
+        return parse_server(self.address)
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +86,10 @@ class Turbine:
     def devices(self) -> tuple[Device, ...]:
         """All devices, station by station."""
         return tuple(device for station in self.stations for device in station.devices)
+
+    def servers(self, bus: str) -> dict[int, Server]:
+        """Where the nodes of a Modbus TCP bus listen; none on any other."""
+        return {device.node: device.server for device in self.devices if device.bus == bus and device.address}
 
     def device(self, target: str) -> Device | None:
         """The device with this slug, with or without the turbine in front, or with this node number."""
@@ -126,28 +152,42 @@ class _Reader:
     def _turbine(self, slug: str, table: Mapping[str, Any]) -> Turbine:
         where = f"turbine.{slug}."
         self._known(table, "name bus station", where)
-        for name, bus in self._tables(table, "bus", where):
-            self._known(bus, "connection bitrate heartbeat_node", f"{where}bus.{name}.")
-        buses = tuple(
-            BusConfig(
-                name,
-                self._text(bus, "connection", f"{where}bus.{name}."),
-                self._int(bus, "bitrate", f"{where}bus.{name}.", 500_000),
-                self._node(bus, "heartbeat_node", f"{where}bus.{name}.", HEARTBEAT_NODE),
-            )
-            for name, bus in self._tables(table, "bus", where)
-        )
+        buses = tuple(self._bus(name, bus, f"{where}bus.{name}.") for name, bus in self._tables(table, "bus", where))
         stations = tuple(
             self._station(slug, name, station, buses) for name, station in self._tables(table, "station", where)
         )
         turbine = Turbine(slug, str(table.get("name", slug.upper())), buses, stations)
         named = {name for name, bus in self._tables(table, "bus", where) if "heartbeat_node" in bus}
         seen = {(bus.name, bus.heartbeat_node): f"{where}bus.{bus.name}" for bus in buses if bus.name in named}
+        servers: dict[str, str] = {}
         for device in turbine.devices:
             other = seen.setdefault((device.bus, device.node), device.slug)
             if other != device.slug:
                 raise self._wrong(f"{device.slug}.node", f"node {device.node} is already {other}")
+            if device.address and (other := servers.setdefault(device.server.text, device.slug)) != device.slug:
+                raise self._wrong(f"{device.slug}.address", f"{device.address} is already {other}")
         return turbine
+
+    def _bus(self, name: str, table: Mapping[str, Any], where: str) -> BusConfig:
+        self._known(table, "connection bitrate heartbeat_node ranges", where)
+        connection = self._text(table, "connection", where)
+        heartbeat = self._node(table, "heartbeat_node", where, HEARTBEAT_NODE)
+        if connection != MODBUS:
+            if "ranges" in table:
+                raise self._wrong(f"{where}ranges", f"is for a bus with connection '{MODBUS}'")
+            return BusConfig(name, connection, self._int(table, "bitrate", where, 500_000), heartbeat)
+        for key in ("bitrate", "heartbeat_node"):
+            if key in table:
+                raise self._wrong(f"{where}{key}", f"is not for a bus with connection '{MODBUS}'")
+        ranges = table.get("ranges")
+        if not isinstance(ranges, list) or not ranges or not all(isinstance(one, str) for one in ranges):
+            raise self._wrong(f"{where}ranges", "is missing or no list of addresses")
+        for text in ranges:
+            try:
+                parse_range(text)
+            except ValueError as error:
+                raise self._wrong(f"{where}ranges", str(error)) from error
+        return BusConfig(name, connection, 0, heartbeat, tuple(ranges))
 
     def _station(self, turbine: str, slug: str, table: Mapping[str, Any], buses: tuple[BusConfig, ...]) -> Station:
         where = f"turbine.{turbine}.station.{slug}."
@@ -162,13 +202,34 @@ class _Reader:
         return Station(f"{turbine}/{slug}", str(table.get("name", slug.replace("-", " "))), blade, devices)
 
     def _device(self, slug: str, table: Mapping[str, Any], where: str, buses: tuple[BusConfig, ...]) -> Device:
-        self._known(table, "name description bus node", where)
+        self._known(table, "name description bus node address external_stop", where)
         node = self._node(table, "node", where, None)
         bus = str(table.get("bus", buses[0].name if buses else ""))
-        if bus not in {one.name for one in buses}:
+        config = next((one for one in buses if one.name == bus), None)
+        if config is None:
             raise self._wrong(f"{where}bus", f"bus '{bus}' is not named in this turbine")
         name = str(table.get("name", slug.rsplit("/", 1)[1].upper()))
-        return Device(slug, name, self._text(table, "description", where), bus, node)
+        description = self._text(table, "description", where)
+        stop = self._text(table, "external_stop", where) if "external_stop" in table else ""
+        return Device(slug, name, description, bus, node, self._address(table, config, where), stop)
+
+    def _address(self, table: Mapping[str, Any], bus: BusConfig, where: str) -> str:
+        """Where a device of Modbus TCP listens, within what the bus allows."""
+        if bus.kind is not Bus.MODBUS_TCP:
+            if "address" in table:
+                raise self._wrong(f"{where}address", f"is for a bus with connection '{MODBUS}'")
+            return ""
+        text = self._text(table, "address", where)
+        try:
+            server = parse_server(text)
+        except ValueError as error:
+            raise self._wrong(f"{where}address", str(error)) from error
+        if not any(parse_range(one).holds(server) for one in bus.ranges):
+            allowed = ", ".join(bus.ranges)
+            raise self._wrong(
+                f"{where}address", f"{server.text} is not within the ranges of bus '{bus.name}': {allowed}"
+            )
+        return text
 
     def _text(self, table: Mapping[str, Any], key: str, where: str) -> str:
         value = table.get(key)

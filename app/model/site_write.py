@@ -18,6 +18,7 @@ from tomlkit.exceptions import TOMLKitError
 from tomlkit.items import InlineTable
 
 from app.errors import SiteError
+from app.model.description import Bus
 from app.model.site import HEARTBEAT_NODE, SCHEMA, BusConfig, Device, Station, Turbine, read_site
 
 _HEAD: Final = "Turbines, their stations and devices, and where each is found on a bus."
@@ -112,6 +113,13 @@ def _turbine(table: MutableMapping[str, Any], turbine: Turbine) -> None:
 
 def _bus(table: MutableMapping[str, Any], bus: BusConfig) -> None:
     _put(table, "connection", bus.connection, None)
+    if bus.kind is Bus.MODBUS_TCP:
+        for key in ("bitrate", "heartbeat_node"):
+            table.pop(key, None)
+        if tuple(table.get("ranges", ())) != bus.ranges:
+            table["ranges"] = list(bus.ranges)
+        return
+    table.pop("ranges", None)
     _put(table, "bitrate", bus.bitrate, None)
     _put(table, "heartbeat_node", bus.heartbeat_node, HEARTBEAT_NODE)
 
@@ -131,6 +139,8 @@ def _device(table: MutableMapping[str, Any], device: Device, first_bus: str) -> 
     _put(table, "description", device.description_id, None)
     _put(table, "bus", device.bus, first_bus)
     _put(table, "node", device.node, None)
+    _put(table, "address", device.address or None, None)
+    _put(table, "external_stop", device.external_stop or None, None)
 
 
 def last(slug: str) -> str:

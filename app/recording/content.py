@@ -15,6 +15,7 @@ SCHEMA_NUMBER: Final = 1
 METADATA_RECORDING: Final = "recording"
 METADATA_BIT_RATES: Final = "bit_rates"
 METADATA_NODES: Final = "nodes"
+METADATA_SERVERS: Final = "servers"
 METADATA_VERSIONS: Final = "versions"
 METADATA_TOTALS: Final = "totals"
 METADATA_RECOVERY: Final = "recovery"
@@ -94,13 +95,17 @@ def from_stored(stored: AttachedFile) -> AttachedFile:
 
 @dataclass(frozen=True)
 class RecordingInfo:
-    """What a recording is of. ``bit_rates`` in bit/s by bus; ``nodes`` maps ``can0/11`` to slug and description."""
+    """What a recording is of. ``bit_rates`` in bit/s by bus; ``nodes`` maps ``can0/11`` to slug and description.
+
+    ``servers`` maps a node of a Modbus TCP bus to its ``host:port``.
+    """
 
     turbine: str
     who: str
     bit_rates: Mapping[str, int] = field(default_factory=dict)
     nodes: Mapping[str, str] = field(default_factory=dict)
     versions: Mapping[str, str] = field(default_factory=dict)
+    servers: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,9 @@ from app.model.description_file import load_builtin
 
 NodeKey = tuple[str, int]
 """Bus and node."""
-MAX_CANOPEN: Final = 127
+ServerTable = Mapping[NodeKey, str]
+"""``host:port`` of the nodes of Modbus TCP buses."""
+MAX_NODE: Final = {Bus.CANOPEN: 127, Bus.MODBUS_TCP: 247}
 
 
 class NodeName(NamedTuple):
@@ -33,13 +35,28 @@ def read_nodes(table: Mapping[str, str]) -> dict[NodeKey, NodeName]:
 
 
 def described(table: Mapping[str, str]) -> dict[NodeKey, Description]:
-    """What describes the nodes of CANopen; a node that none of our own descriptions fits is left out."""
+    """What describes the nodes; one that none of our own descriptions fits is left out."""
     found = {}
     for (bus, node), name in read_nodes(table).items():
         try:
             description = load_builtin(name.description_id)
         except UsageError:
             continue
-        if 1 <= node <= MAX_CANOPEN and description.bus is Bus.CANOPEN:
+        if 1 <= node <= MAX_NODE.get(description.bus, 0):
             found[bus, node] = description
     return found
+
+
+def read_servers(table: Mapping[str, str]) -> dict[NodeKey, str]:
+    """The table ``servers`` (``lan/1``: ``host:port``) by bus and node; a key that names no node is passed over."""
+    found = {}
+    for key, server in table.items():
+        bus, _, number = key.rpartition("/")
+        if bus and number.isdecimal():
+            found[bus, int(number)] = server
+    return found
+
+
+def server_table(servers: ServerTable) -> dict[str, str]:
+    """What ``read_servers`` reads."""
+    return {f"{bus}/{node}": server for (bus, node), server in servers.items()}

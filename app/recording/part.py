@@ -16,6 +16,7 @@ from app.recording.content import (
     METADATA_BIT_RATES,
     METADATA_NODES,
     METADATA_RECORDING,
+    METADATA_SERVERS,
     METADATA_TOTALS,
     METADATA_VERSIONS,
     SCHEMA_NUMBER,
@@ -111,6 +112,8 @@ class Part:
         )
         file.add_metadata(METADATA_BIT_RATES, {bus: str(rate) for bus, rate in info.bit_rates.items()})
         file.add_metadata(METADATA_NODES, info.nodes)
+        if info.servers:
+            file.add_metadata(METADATA_SERVERS, info.servers)
         file.add_metadata(METADATA_VERSIONS, info.versions)
         for attachment in attachments:
             self.attach(attachment, identity.created_ns)

@@ -39,6 +39,7 @@ from app.recording.content import (
     METADATA_CHUNK_CHANNELS,
     METADATA_NODES,
     METADATA_RECORDING,
+    METADATA_SERVERS,
     METADATA_TOTALS,
     METADATA_VERSIONS,
     SCHEMA_NUMBER,
@@ -52,7 +53,7 @@ from app.recording.content import (
 from app.recording.file_bytes import FileBytes
 from app.recording.foreign import is_foreign, read_foreign
 from app.recording.loose import bodies_in, frames_in, messages_in, payloads_in
-from app.recording.node_table import described
+from app.recording.node_table import ServerTable, described, read_servers
 from app.recording.part import Identity
 from app.recording.scan import (
     Bytes,
@@ -225,6 +226,11 @@ class Recording:
         return described(self.metadata.get(METADATA_NODES, {}))
 
     @property
+    def servers(self) -> ServerTable:
+        """Where the nodes of Modbus TCP buses listened, by bus and node."""
+        return read_servers(self.metadata.get(METADATA_SERVERS, {}))
+
+    @property
     def info(self) -> RecordingInfo:
         """What the recording is of; nothing is known of files of others.
 
@@ -240,6 +246,7 @@ class Recording:
             bit_rates={bus: self._int(rate) for bus, rate in tables.get(METADATA_BIT_RATES, {}).items()},
             nodes=dict(tables.get(METADATA_NODES, {})),
             versions=dict(tables.get(METADATA_VERSIONS, {})),
+            servers=dict(tables.get(METADATA_SERVERS, {})),
         )
 
     @property

@@ -13,29 +13,45 @@ from app.service.trace.log import BusTrace
 from app.wire.busload import EXTENDED_KEY, BusLoad, LoadSecond
 from app.wire.can_bits import frame_bits
 from app.wire.decoder import CanOpenDecoder
-from app.wire.frame import Can, Frame
+from app.wire.decoders import BusDecoder, decoder_of
+from app.wire.frame import Adu, Can, Frame
 from app.wire.live import LiveState
+from app.wire.modbus.decoder import ModbusDecoder
 from app.wire.pdo_follower import PdoRoute
 from app.wire.records import Record
 
 GAP_REASON: Final = GAP_REASONS[EventKind.BUS_LOST]
 
 
+ETHERNET_BPS: Final = 100_000_000
+"""What the load of a Modbus TCP bus is a share of: the port of the drives (fast Ethernet)."""
+_TCP_OCTETS: Final = 14 + 20 + 20 + 24
+"""What carries an ADU: Ethernet, IP and TCP headers, check, preamble and gap."""
+
+
 class BusFeed:
-    """Frames of a CANopen bus go through the decoder into the live state and count as bus load.
+    """Frames of a bus go through the decoder into the live state and count as bus load.
 
     ``lock`` is shared by all buses of a stage, because the live state has one writer at a time. ``descriptions`` by
-    node; ``bitrate`` in bit/s.
+    node; ``bitrate`` in bit/s. ``servers``: ``host:port`` by node, where it is a Modbus TCP bus.
     """
 
     def __init__(
-        self, name: str, bitrate: int, descriptions: Mapping[int, Description], live: LiveState, lock: Lock
+        self,
+        name: str,
+        bitrate: int,
+        descriptions: Mapping[int, Description],
+        live: LiveState,
+        lock: Lock,
+        servers: Mapping[int, str] | None = None,
     ) -> None:
         self.name = name
         self.bitrate = bitrate
-        self.decoder = CanOpenDecoder(name, descriptions)
-        self.load = BusLoad(bitrate)
-        self.trace = BusTrace(name, self.decoder, lock)
+        self.decoder: BusDecoder = decoder_of(name, descriptions, servers)
+        self._can = self.decoder if isinstance(self.decoder, CanOpenDecoder) else None
+        self._modbus = self.decoder if isinstance(self.decoder, ModbusDecoder) else None
+        self.load = BusLoad(bitrate if self._modbus is None else ETHERNET_BPS)
+        self.trace = BusTrace(name, self._can or CanOpenDecoder(name), lock)
         self.frames = 0
         self._live = live
         self._lock = lock
@@ -52,10 +68,16 @@ class BusFeed:
         with self._lock:
             self.frames += len(frames)
             count = self.load.feed
-            for t_ns, _, _, can, _ in frames:
-                if type(can) is Can:
-                    count(t_ns, frame_bits(can), can.can_id, can.extended)
-            self.trace.take(frames)
+            if self._modbus is not None:
+                for frame in frames:
+                    if isinstance(frame.payload, Adu):
+                        bits = 8 * (len(frame.payload.data) + _TCP_OCTETS)
+                        count(frame.t_ns, bits, self._modbus.node_of(frame))
+            else:
+                for t_ns, _, _, can, _ in frames:
+                    if type(can) is Can:
+                        count(t_ns, frame_bits(can), can.can_id, can.extended)
+                self.trace.take(frames)
             records = self.decoder.feed_all(frames)
             if records:
                 self.trace.heard(records)
@@ -65,7 +87,8 @@ class BusFeed:
     def gap(self, t_ns: int, reason: str = GAP_REASON) -> None:
         """Frames are missing before ``t_ns``: what was read until then proves nothing any more."""
         with self._lock:
-            self.trace.gap(t_ns, reason)
+            if self._can is not None:
+                self.trace.gap(t_ns, reason)
             records = self.decoder.gap(t_ns, reason)
             self.trace.heard(records)
             self._missed(records)
@@ -98,7 +121,9 @@ class BusFeed:
             return list(self.load.history)[-seconds:], self.load.history_by(self._node_of)[-seconds:]
 
     def _node_of(self, key: int) -> int:
-        return self.decoder.speaker(key & ~EXTENDED_KEY, bool(key & EXTENDED_KEY)).node
+        if self._can is None:
+            return key
+        return self._can.speaker(key & ~EXTENDED_KEY, bool(key & EXTENDED_KEY)).node
 
     def pdos(self, node: int) -> tuple[PdoRoute, ...]:
         """The PDOs of ``node`` by the mapping in force."""

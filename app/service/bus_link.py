@@ -6,11 +6,13 @@ from collections.abc import Callable, Mapping, Sequence
 from threading import Lock
 from typing import Any, Protocol
 
-from app.drivers.can_config import parse_can
+from app.drivers.can_config import CanConfig, parse_can
 from app.drivers.contract import DriverStatus
+from app.drivers.modbus_config import ModbusConfig, ModbusPeer
 from app.drivers.table import driver_class
 from app.model.address import Address
 from app.model.description import Bus, Description
+from app.model.servers import Server
 from app.model.site import BusConfig
 from app.service.bus_feed import BusFeed
 from app.service.office.foreign_writes import ForeignWrites
@@ -33,9 +35,10 @@ Listener = Callable[[Sequence[Record]], None]
 
 
 class BusLink(BusFeed):
-    """A CANopen bus: what its driver hears goes to the recorder first.
+    """A bus: what its driver hears goes to the recorder first.
 
-    ``on_frames`` runs on the driver's receive thread. ``known`` are the descriptions that a scan may recognise.
+    ``on_frames`` runs on the driver's receive thread. ``known`` are the descriptions that a scan may recognise;
+    ``servers`` is where the nodes of a Modbus TCP bus listen.
     """
 
     def __init__(
@@ -47,22 +50,23 @@ class BusLink(BusFeed):
         lock: Lock,
         stamper: Stamper,
         options: Options,
+        servers: Mapping[int, Server] | None = None,
     ) -> None:
-        with_rate = "@" in config.connection or not config.bitrate
-        can = parse_can(config.connection if with_rate else f"{config.connection}@{config.bitrate}")
-        super().__init__(config.name, can.bitrate, descriptions, live, lock)
+        self.kind = config.kind
+        can = None if self.kind is Bus.MODBUS_TCP else _with_rate(config)
+        texts = None if can is not None else {node: server.text for node, server in (servers or {}).items()}
+        super().__init__(config.name, 0 if can is None else can.bitrate, descriptions, live, lock, texts)
         self.adapter = config.connection
         self.sink: FrameSink | None = None
         self.foreign: ForeignWrites | None = None
         self.listeners: tuple[Listener, ...] = ()
-        self.driver: Any = driver_class(Bus.CANOPEN)(
-            can,
-            stamper,
-            config.name,
-            known,
-            consent=options.consent,
-            listen_s=options.listen_s,
-        )
+        driver = driver_class(self.kind)
+        self.driver: Any
+        if can is None:
+            peers = tuple(ModbusPeer(node, *server) for node, server in (servers or {}).items())
+            self.driver = driver(ModbusConfig(peers), stamper, config.name, known)
+        else:
+            self.driver = driver(can, stamper, config.name, known, consent=options.consent, listen_s=options.listen_s)
         for node, description in descriptions.items():
             self.describe(node, description)
         self.driver.subscribe(self.on_frames)
@@ -107,7 +111,7 @@ class BusLink(BusFeed):
     @property
     def needs_consent(self) -> bool:
         """Another master is at work, and nobody has consented to active access yet."""
-        return bool(self.driver.needs_consent)
+        return bool(getattr(self.driver, "needs_consent", False))  # TCP shows no other master
 
     def send_pdo(self, node: int, address: Address, data: bytes) -> bool:
         """Send ``data`` by the receive PDO of ``node`` that carries ``address`` and nothing else, and works at once.
@@ -117,7 +121,7 @@ class BusLink(BusFeed):
         Raises BusLostError.
         """
         view = self._live.node(self.name, node)
-        if view is None or view.state is not NmtState.OPERATIONAL or view.silent:
+        if self.kind is not Bus.CANOPEN or view is None or view.state is not NmtState.OPERATIONAL or view.silent:
             return False
         for route in self.pdos(node):
             entries = route.mapping.entries
@@ -125,3 +129,8 @@ class BusLink(BusFeed):
             if route.source is Source.PDO_RX and carries and route.at_once:
                 return bool(self.driver.command_raw(node, address, Can(route.can_id, data, route.extended)))
         return False
+
+
+def _with_rate(config: BusConfig) -> CanConfig:
+    with_rate = "@" in config.connection or not config.bitrate
+    return parse_can(config.connection if with_rate else f"{config.connection}@{config.bitrate}")

@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from app.drivers.contract import DriverStatus, LinkState, MasterSign
 from app.errors import RecordingError, UsageError
-from app.model.description import Bus, Description
+from app.model.description import Description
 from app.model.site import Device, Turbine
 from app.recording.content import RecorderClock
 from app.recording.writer import RecorderStatus
@@ -56,9 +56,18 @@ class Connection:
         self._clock = RecorderClock(monotonic_ns, wall_ns, self.stamper)
         self._targets = {device.slug: self._target(device, descriptions) for device in turbine.devices}
         self._lock = Lock()
-        known = tuple(one for one in descriptions.values() if one.bus is Bus.CANOPEN)
+        known = tuple(descriptions.values())
         self.buses = {
-            bus.name: BusLink(bus, self._by_node(bus.name), known, self.live, self._lock, self.stamper, options)
+            bus.name: BusLink(
+                bus,
+                self._by_node(bus.name),
+                tuple(one for one in known if one.bus is bus.kind),
+                self.live,
+                self._lock,
+                self.stamper,
+                options,
+                turbine.servers(bus.name),
+            )
             for bus in turbine.buses
         }
         self.foreign = ForeignWrites(self._targets.values(), self.journal)
@@ -149,8 +158,9 @@ class Connection:
         description = descriptions.get(device.description_id)
         if description is None:
             raise UsageError(reason=f"{device.slug}: no description '{device.description_id}'")
-        if description.bus is not Bus.CANOPEN:
-            raise UsageError(reason=f"{device.slug}: {description.id} is no device of a CAN bus")
+        bus = next(one for one in self.turbine.buses if one.name == device.bus)
+        if description.bus is not bus.kind:
+            raise UsageError(reason=f"{device.slug}: {description.id} is no device of a bus with {bus.kind.value}")
         return Target(device, description, self.live, self.gate)
 
     def _by_node(self, bus: str) -> dict[int, Description]:
@@ -181,7 +191,12 @@ class Connection:
         return Subject(
             turbine=self.turbine.slug,
             person=self._options.person,
-            bit_rates={name: link.bitrate for name, link in self.buses.items()},
+            bit_rates={name: link.bitrate for name, link in self.buses.items() if link.bitrate},
+            servers={
+                f"{bus.name}/{node}": server.text
+                for bus in self.turbine.buses
+                for node, server in self.turbine.servers(bus.name).items()
+            },
             nodes={f"{t.device.bus}/{t.node}": f"{t.slug} {t.description.id}" for t in self._targets.values()},
             descriptions={t.description.id: t.description for t in self._targets.values()}.values(),
         )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
@@ -28,13 +28,14 @@ _KINDS: Final = {
 
 @dataclass(frozen=True, slots=True)
 class Subject:
-    """What is recorded. ``nodes`` maps ``can0/11`` to slug and description."""
+    """What is recorded. ``nodes`` maps ``can0/11`` to slug and description; ``servers`` a node to ``host:port``."""
 
     turbine: str
     person: str
     bit_rates: Mapping[str, int]
     nodes: Mapping[str, str]
     descriptions: Iterable[Description]
+    servers: Mapping[str, str] = field(default_factory=dict)
 
 
 class Recording:
@@ -53,6 +54,7 @@ class Recording:
             who=subject.person,
             bit_rates=dict(subject.bit_rates),
             nodes=dict(subject.nodes),
+            servers=dict(subject.servers),
             versions={"hubside": __version__, "python": platform.python_version()},
         )
         attached = [

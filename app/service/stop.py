@@ -25,6 +25,7 @@ from app.service.devices import Target, decode
 from app.service.journal import Journal, Kind
 
 CONTROLWORD: Final = Address(0x6040)
+EFC_TARGET: Final = Address(0x567A)
 STATUSWORD: Final = Address(0x6041)
 _OBEY_S: Final = 0.03
 
@@ -69,8 +70,13 @@ class Axis:
 async def command_all(
     axes: Iterable[Axis], command: Command, journal: Journal, now_ns: Callable[[], int]
 ) -> list[AxisOutcome]:
-    """Send ``command`` to all axes at once. Never raises for one axis' sake."""
-    outcomes = await asyncio.gather(*(_command(axis, command, now_ns) for axis in axes))
+    """Send ``command`` to all axes at once. Never raises for one axis' sake.
+
+    FEATHER goes to those that have it: bit 11 of a drive without an EFC says nothing, and the rest would enable it.
+    """
+    outcomes = await asyncio.gather(
+        *(_command(axis, command, now_ns) for axis in axes if command is Command.STOP or has_feather(axis.target))
+    )
     kind = Kind.STOP_SENT if command is Command.STOP else Kind.FEATHER_SENT
     sent = [outcome for outcome in outcomes if outcome.how is not Path.FAILED]
     journal.note(kind, None, count=len(sent), failed=len(outcomes) - len(sent))
@@ -80,6 +86,11 @@ async def command_all(
 def is_axis(target: Target) -> bool:
     """True for a device that has a controlword of CiA 402."""
     return CONTROLWORD in target.description.entries and STATUSWORD in target.description.entries
+
+
+def has_feather(target: Target) -> bool:
+    """True for an axis with an EFC of its own (bit 11 of the controlword)."""
+    return EFC_TARGET in target.description.entries
 
 
 async def _command(axis: Axis, command: Command, now_ns: Callable[[], int]) -> AxisOutcome:

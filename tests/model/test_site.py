@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
 
 from app.errors import SiteError
-from app.model.site import load_site
+from app.model.description import Bus
+from app.model.servers import Server, parse_range, parse_server
+from app.model.site import Turbine, load_site, read_site
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "docs" / "sites" / "example.toml"
 
@@ -47,3 +50,74 @@ def test_a_wrong_site_names_the_place(tmp_path: Path, old: str, new: str, key: s
         load_site(path)
     assert caught.value.details["key"] == key
     assert caught.value.details["file"] == str(path)
+
+
+MODBUS_SITE = """
+schema = 1
+[turbine.bench-pd4e]
+name = "Bench"
+[turbine.bench-pd4e.bus.lan]
+connection = "modbus-tcp"
+ranges = {ranges}
+[turbine.bench-pd4e.station.bench.device]
+servo = {{ description = "nanotec-pd4e", node = 1, address = "{address}"{more} }}
+"""
+
+
+def modbus_site(address: str, ranges: str = '["192.168.2.10-192.168.2.20"]', more: str = "") -> tuple[Turbine, ...]:
+    return read_site(MODBUS_SITE.format(ranges=ranges, address=address, more=more), "bench.toml")
+
+
+def test_a_device_of_modbus_tcp_has_an_address_within_the_ranges_of_its_bus() -> None:
+    (turbine,) = modbus_site("192.168.2.11/3", more=', external_stop = "S1 at the cabinet"')
+    (bus,), (servo,) = turbine.buses, turbine.devices
+    assert (bus.kind, bus.bitrate, bus.ranges) == (Bus.MODBUS_TCP, 0, ("192.168.2.10-192.168.2.20",))
+    assert (servo.server, servo.external_stop) == (Server("192.168.2.11", 502, 3), "S1 at the cabinet")
+    assert turbine.servers("lan") == {1: servo.server}
+
+
+@pytest.mark.parametrize(
+    ("address", "ranges", "more", "reason"),
+    [
+        ("192.168.2.21", '["192.168.2.10-192.168.2.20"]', "", "is not within the ranges of bus 'lan'"),
+        ("192.168.2.11:1502", '["192.168.2.10-192.168.2.20"]', "", "is not within the ranges"),
+        ("pitch-1", '["192.168.2.10-192.168.2.20"]', "", "is not within the ranges"),
+        ("192.168.2.11/256", '["192.168.2.0/24"]', "", "unit 256 is not within 0 to 255"),
+        ("192.168.2.11:0", '["192.168.2.0/24"]', "", "port 0 is not within 1 to 65535"),
+        ("192.168.2.11", '["192.168.2.20-192.168.2.10"]', "", "ends before it begins"),
+        ("192.168.2.11", '["everywhere"]', "", "is not IP, IP-IP or NETWORK/BITS"),
+        ("192.168.2.11", "[]", "", "is missing or no list of addresses"),
+        ("192.168.2.255", '["192.168.2.0/24"]', "", "is not within the ranges"),
+        ("192.168.2.11", '["192.168.2.0/24"]', ", ip = 3", "ip: is no key here"),
+    ],
+)
+def test_a_wrong_address_names_its_place(address: str, ranges: str, more: str, reason: str) -> None:
+    with pytest.raises(SiteError, match=re.escape(reason)):
+        modbus_site(address, ranges, more)
+
+
+@pytest.mark.parametrize(
+    ("text", "inside", "outside"),
+    [
+        ("127.0.0.1:1502", "127.0.0.1:1502", "127.0.0.1"),
+        ("10.0.0.0/30", "10.0.0.2", "10.0.0.3"),
+        ("[fd00::1-fd00::9]:1502", "[fd00::5]:1502", "[fd00::a]:1502"),
+        ("10.0.0.1-10.0.1.1", "10.0.0.255", "[fd00::1]"),
+    ],
+)
+def test_ranges(text: str, inside: str, outside: str) -> None:
+    found = parse_range(text)
+    assert found.holds(parse_server(inside))
+    assert not found.holds(parse_server(outside))
+    assert str(parse_server(inside)) == inside
+
+
+def test_two_devices_have_no_address_in_common_and_a_can_bus_has_none() -> None:
+    two = ' }\nother = { description = "nanotec-pd4e", node = 2, address = "192.168.2.11"'
+    with pytest.raises(SiteError, match=re.escape("192.168.2.11 is already bench-pd4e/bench/servo")):
+        modbus_site("192.168.2.11", more=two)
+    text = MODBUS_SITE.format(ranges='["192.168.2.11"]', address="192.168.2.11", more="")
+    with pytest.raises(SiteError, match="is for a bus with connection 'modbus-tcp'"):
+        read_site(text.replace('"modbus-tcp"\nranges = ["192.168.2.11"]', '"socketcan:can0"'), "x")
+    with pytest.raises(SiteError, match="is not for a bus"):
+        read_site(text.replace("ranges", "bitrate = 500_000\nranges"), "x")

@@ -105,3 +105,16 @@ def test_a_failed_write_leaves_the_file(tmp_path: Path) -> None:
         write_site(path, "\ud800")
     assert path.read_text(encoding="utf-8") == TEXT
     assert {one.name for one in tmp_path.iterdir()} == {"site.toml", "site.previous.toml"}
+
+
+def test_a_bus_of_modbus_tcp_is_written_as_it_is_read(turbine: Turbine) -> None:
+    slug = "wtg-07/bench"
+    servo = Device(f"{slug}/servo", "SERVO", "nanotec-pd4e", "lan", 1, "192.168.2.11:1502/3", "S1 at the cabinet")
+    lan = BusConfig("lan", "modbus-tcp", 0, ranges=("192.168.2.0/24:1502",))
+    wanted = replace(
+        turbine, buses=(*turbine.buses, lan), stations=(*turbine.stations, Station(slug, "bench", None, (servo,)))
+    )
+    text = with_turbine(TEXT, wanted, "x")
+    assert read_site(text, "x") == (wanted,)
+    less = replace(wanted, buses=(*turbine.buses, replace(lan, ranges=("192.168.2.11:1502",))))
+    assert read_site(with_turbine(text, less, "x"), "x") == (less,)

@@ -202,16 +202,18 @@ def _info(sources: Sequence[_Source]) -> RecordingInfo:
     infos = [source.recording.info for source in sources]
     rates: dict[str, int] = {}
     nodes: dict[str, str] = {}
+    servers: dict[str, str] = {}
     for source, info in zip(sources, infos, strict=True):
         rates |= {source.bus(bus): rate for bus, rate in info.bit_rates.items()}
-        for key, what in info.nodes.items():
-            bus, _, number = key.rpartition("/")
-            key = f"{source.bus(bus)}/{number}"
-            if nodes.setdefault(key, what) != what:
-                raise UsageError(reason=f"{key} is {nodes[key]} in one file and {what} in another: rename a bus")
+        for table, told in ((nodes, info.nodes), (servers, info.servers)):
+            for key, what in told.items():
+                bus, _, number = key.rpartition("/")
+                key = f"{source.bus(bus)}/{number}"
+                if table.setdefault(key, what) != what:
+                    raise UsageError(reason=f"{key} is {table[key]} in one file and {what} in another: rename a bus")
     versions = {name: version for info in infos for name, version in info.versions.items()}
     return RecordingInfo(
-        _joined(info.turbine for info in infos), _joined(info.who for info in infos), rates, nodes, versions
+        _joined(info.turbine for info in infos), _joined(info.who for info in infos), rates, nodes, versions, servers
     )
 
 

@@ -26,6 +26,7 @@ from app.recording.index.pages import Page
 from app.recording.index.place import fingerprint, in_cache, index_path
 from app.recording.index.tracks import Tracks, pack_history
 from app.recording.index.traffic import BusTraffic, LoadPage
+from app.recording.node_table import server_table
 from app.recording.reader import Recording, open_recording
 from app.recording.schemas import FIXED_TOPICS
 from app.wire.events import Event
@@ -104,7 +105,7 @@ class _Builder:
         self._span_ns = recording.span_ns or (0, 0)
         self._buses = [topic[1:] for topic in recording.topics if topic not in FIXED_TOPICS]
         self._noted = list(recording.events())
-        self._course = Course(self._buses, descriptions, _MAX_EVENTS)
+        self._course = Course(self._buses, descriptions, _MAX_EVENTS, recording.servers)
         self._finder = SignFinder(descriptions)
         self._watched = {key: self._finder.watched(*key) for key in descriptions}
         self._unwatched: dict[tuple[str, int], ValueSeen] = {}
@@ -147,6 +148,7 @@ class _Builder:
         table = {"start_ns": str(start_ns), "end_ns": str(end_ns), "frames": str(frames)}
         described = {f"{bus}/{node}": one.id for (bus, node), one in self._descriptions.items()}
         table["described"] = json.dumps(described)
+        table["servers"] = json.dumps(server_table(self._recording.servers))
         return table | {f"bit_rate/{bus}": rates.get(bus, "0") for bus in self._traffic}
 
     def _steps(self) -> Iterator[Step]:

@@ -10,18 +10,20 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import groupby
 from operator import attrgetter
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, TypeVar
 
 from app.errors import HubsideError
 from app.model.description import Description
 from app.recording.content import Event, EventKind, Keyframe
 from app.recording.index.content import Gap
-from app.wire.decoder import CanOpenDecoder
+from app.recording.node_table import ServerTable
+from app.wire.decoders import decoder_of, decoder_of_frame, decoder_of_state
 from app.wire.frame import Frame
 from app.wire.live import LiveState
 from app.wire.records import Record
 
 _BUS: Final = attrgetter("bus")
+_Told = TypeVar("_Told")
 Descriptions = Mapping[tuple[str, int], Description]
 
 TICK_NS: Final = 100_000_000
@@ -61,13 +63,20 @@ class Step(NamedTuple):
 class Course:
     """Decoders and live state of a recording, led from step to step. Not thread-safe, but ``live`` may be read."""
 
-    def __init__(self, buses: Iterable[str], descriptions: Descriptions, max_events: int = 2000) -> None:
+    def __init__(
+        self,
+        buses: Iterable[str],
+        descriptions: Descriptions,
+        max_events: int = 2000,
+        servers: ServerTable | None = None,
+    ) -> None:
+        at = servers or {}
         self.live = LiveState(max_events)
         self.heard_ns = 0
         """Time of the last frame."""
         self.decoders = {
-            bus: CanOpenDecoder(bus, {node: one for (name, node), one in descriptions.items() if name == bus})
-            for bus in sorted({*buses, *(bus for bus, _ in descriptions)})
+            bus: decoder_of(bus, _on(bus, descriptions), _on(bus, at) or None)
+            for bus in sorted({*buses, *(bus for bus, _ in descriptions), *(bus for bus, _ in at)})
         }
         for (bus, node), description in descriptions.items():
             self.live.set_description(bus, node, description)
@@ -77,10 +86,11 @@ class Course:
         if not frames:
             return []
         records: list[Record] = []
-        for bus, of_bus in groupby(frames, key=_BUS):
+        for bus, batch in groupby(frames, key=_BUS):
+            of_bus = list(batch)
             decoder = self.decoders.get(bus)
             if decoder is None:
-                decoder = self.decoders[bus] = CanOpenDecoder(bus)
+                decoder = self.decoders[bus] = decoder_of_frame(of_bus[0])
             records += decoder.feed_all(of_bus)
         self.live.apply_all(records)
         self.heard_ns = frames[-1].t_ns
@@ -120,9 +130,13 @@ class Course:
         self.live.restore(state["live"])
         for bus, kept in state["decoders"].items():
             if bus not in self.decoders:
-                self.decoders[bus] = CanOpenDecoder(bus)
+                self.decoders[bus] = decoder_of_state(bus, kept)
             self.decoders[bus].restore(kept)
         self.heard_ns = state.get("heard_ns", self.live.t_ns)
+
+
+def _on(bus: str, table: Mapping[tuple[str, int], _Told]) -> dict[int, _Told]:
+    return {node: told for (name, node), told in table.items() if name == bus}
 
 
 def steps(frames: Iterable[Frame], marks: Sequence[Mark], heard_ns: int, start_ns: int, end_ns: int) -> Iterator[Step]:

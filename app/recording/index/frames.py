@@ -67,7 +67,7 @@ def course_at(index: RecordingIndex, recording: Recording, descriptions: Descrip
 
 
 def _restored(index: RecordingIndex, descriptions: Descriptions, t_ns: int) -> tuple[Course, int]:
-    course, keyframe = Course((), descriptions), index.keyframe(t_ns)
+    course, keyframe = Course((), descriptions, servers=index.servers), index.keyframe(t_ns)
     if keyframe is None:
         return course, index.span_ns[0] - 1
     course.restore(keyframe.state)

@@ -29,7 +29,7 @@ from app.recording.index.place import SCHEMA, fingerprint, in_cache, index_path
 from app.recording.index.series import SeriesReader
 from app.recording.index.tracks import unpack_history
 from app.recording.index.traffic import LOAD_PAGE_SHIFT, load_of
-from app.recording.node_table import described
+from app.recording.node_table import ServerTable, described, read_servers
 from app.recording.reader import Recording
 from app.wire.events import Event
 from app.wire.signs import Sign
@@ -78,6 +78,11 @@ class RecordingIndex:
     def descriptions(self) -> Descriptions:
         """What the devices were taken for, as far as it is one of our own descriptions."""
         return described(json.loads(self._meta["described"]))
+
+    @property
+    def servers(self) -> ServerTable:
+        """Where the nodes of Modbus TCP buses listened, by bus and node."""
+        return read_servers(json.loads(self._meta.get("servers", "{}")))
 
     def made_of(self) -> str:
         """Fingerprint of the recording that it was made of."""

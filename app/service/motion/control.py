@@ -19,13 +19,12 @@ from app.model.values import to_scaled
 from app.service.devices import Target, decode
 from app.service.motion.interlocks import POSITION
 from app.service.motion.left import ModeChanged
-from app.service.stop import CONTROLWORD, STATUSWORD
+from app.service.stop import CONTROLWORD, EFC_TARGET, STATUSWORD
 
 MODE: Final = Address(0x6060)
 MODE_SHOWN: Final = Address(0x6061)
 VELOCITY: Final = Address(0x606C)
 MANUAL: Final = Address(0x5040)
-EFC_TARGET: Final = Address(0x567A)
 _EFC: Final = 1 << 11
 _AT_TARGET_DEG: Final = 0.5
 _LOOK_S: Final = 0.01

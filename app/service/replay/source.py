@@ -11,6 +11,7 @@ from threading import Lock
 from typing import Final
 
 from app.errors import RecordingError
+from app.model.servers import MODBUS
 from app.model.site import BusConfig, Device, Station, Turbine
 from app.recording.content import Event, Keyframe
 from app.recording.index import Mark, NearFrames, RecordingIndex, marks_of, open_index
@@ -128,9 +129,14 @@ def turbine_of(recording: Recording, known: Mapping[str, Turbine]) -> Turbine:
             continue
         other = None if named is None else named.device(slug)
         name = slug.rpartition("/")[2].upper() if other is None else other.name
-        stations.setdefault(slug.rpartition("/")[0], []).append(Device(slug, name, description_id, bus, node))
+        at = info.servers.get(f"{bus}/{node}", "")
+        stations.setdefault(slug.rpartition("/")[0], []).append(Device(slug, name, description_id, bus, node, at))
     buses = [topic[1:] for topic in recording.topics if topic not in FIXED_TOPICS]
-    configs = tuple(BusConfig(bus, "", info.bit_rates.get(bus, _USUAL_BITRATE)) for bus in buses)
+    of_modbus = {bus for bus, _ in recording.servers}
+    configs = tuple(
+        BusConfig(bus, MODBUS, 0) if bus in of_modbus else BusConfig(bus, "", info.bit_rates.get(bus, _USUAL_BITRATE))
+        for bus in buses
+    )
     slug = info.turbine or recording.path.stem
     name = slug.upper() if named is None else named.name
     return Turbine(slug, name, configs, tuple(_station(one, devices, named) for one, devices in stations.items()))

@@ -110,7 +110,8 @@ class ReplayStage:
 
     def _feed(self, name: str, bitrate: int) -> BusFeed:
         described = {target.node: target.description for target in self.targets if target.device.bus == name}
-        feed = BusFeed(name, bitrate, described, self.live, self._lock)
+        servers = {node: server.text for node, server in self.turbine.servers(name).items()} or None
+        feed = BusFeed(name, bitrate, described, self.live, self._lock, servers)
         for node, description in described.items():
             feed.describe(node, description)
         return feed

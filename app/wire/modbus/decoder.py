@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final
 
+from app.model.description import Description
 from app.wire.frame import Adu, Direction, Frame
 from app.wire.modbus.adu import Message, decode_adu
 from app.wire.modbus.answers import (
@@ -26,6 +27,7 @@ from app.wire.modbus.requests import (
 )
 from app.wire.modbus.telling import Teller
 from app.wire.modbus.transactions import Connection, Open, Path, path_of
+from app.wire.pdo_follower import PdoRoute
 from app.wire.records import (
     Fault,
     GapSeen,
@@ -45,6 +47,9 @@ _MAX_CONNECTIONS: Final = 64
 class ModbusDecoder:
     """Decoder of the bus ``bus``; ``servers`` are the nodes of the devices by ``host:port``, more by ``set_server``."""
 
+    PROTOCOL: Final = "modbus-tcp"
+    """Names the protocol in a kept state."""
+
     def __init__(self, bus: str, servers: Mapping[str, int] | None = None) -> None:
         self.bus = bus
         self._servers = dict(servers or {})
@@ -57,6 +62,18 @@ class ModbusDecoder:
         """The device ``node`` listens at ``server`` (``host:port``)."""
         self._servers[server] = node
         self._paths.clear()
+
+    def set_description(self, node: int, description: Description | None) -> None:
+        """Nothing is asked of a description: what a device maps is learned from the wire."""
+
+    def pdos(self, node: int) -> tuple[PdoRoute, ...]:
+        """None: nothing is sent unasked."""
+        return ()
+
+    def node_of(self, frame: Frame) -> int:
+        """The device that sent or gets an ADU; 0 where none that is known does."""
+        path = self._path(frame.payload.link, frame.direction) if isinstance(frame.payload, Adu) else None
+        return 0 if path is None else path.node
 
     def image(self, node: int, sent_by_device: bool) -> ProcessImage | None:
         """The process image of ``node`` as it was seen to be, None where it was not."""
@@ -171,6 +188,7 @@ class ModbusDecoder:
         """JSON-able state for a keyframe: open requests, and what was learned of devices. Servers are not in it."""
         return {
             "bus": self.bus,
+            "protocol": self.PROTOCOL,
             "devices": {str(node): device.snapshot() for node, device in self._devices.items()},
             "open": [[*key, connection.snapshot()] for key, connection in self._connections.items()],
         }

@@ -1,0 +1,59 @@
+"""Which decoder a bus needs: by where its devices are, by a kept state, or by a frame of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, Protocol
+
+from app.model.description import Description
+from app.wire.decoder import CanOpenDecoder
+from app.wire.frame import Adu, Frame
+from app.wire.modbus.decoder import ModbusDecoder
+from app.wire.pdo_follower import PdoRoute
+from app.wire.records import Record
+
+
+class BusDecoder(Protocol):
+    """What the decoders of all buses have: see ``CanOpenDecoder``."""
+
+    bus: str
+
+    def set_description(self, node: int, description: Description | None) -> None:
+        """Tell what stands at ``node``."""
+
+    def feed(self, frame: Frame) -> Sequence[Record]:
+        """Decode one frame."""
+
+    def feed_all(self, frames: Iterable[Frame]) -> list[Record]:
+        """Decode many frames in their order."""
+
+    def gap(self, t_ns: int, reason: str) -> Sequence[Record]:
+        """Frames are missing before ``t_ns``; ``reason`` is a text key."""
+
+    def pdos(self, node: int) -> tuple[PdoRoute, ...]:
+        """The PDOs of ``node`` in force."""
+
+    def snapshot(self) -> dict[str, Any]:
+        """JSON-able state for a keyframe."""
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Go on from ``snapshot()``. Raises KeyError or ValueError on another state."""
+
+
+def decoder_of(
+    bus: str, descriptions: Mapping[int, Description] | None = None, servers: Mapping[int, str] | None = None
+) -> BusDecoder:
+    """The decoder of ``bus``. ``servers`` are the ``host:port`` of its nodes where it is Modbus TCP, None elsewhere."""
+    if servers is not None:
+        return ModbusDecoder(bus, {server: node for node, server in servers.items()})
+    return CanOpenDecoder(bus, descriptions)
+
+
+def decoder_of_state(bus: str, state: Mapping[str, Any]) -> BusDecoder:
+    """One that can take the kept ``state``, without knowing a device."""
+    return ModbusDecoder(bus) if state.get("protocol") == ModbusDecoder.PROTOCOL else CanOpenDecoder(bus)
+
+
+def decoder_of_frame(frame: Frame) -> BusDecoder:
+    """One for the bus of ``frame``, of which nothing else is known."""
+    return ModbusDecoder(frame.bus) if isinstance(frame.payload, Adu) else CanOpenDecoder(frame.bus)
