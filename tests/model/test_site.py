@@ -88,7 +88,7 @@ def test_a_device_of_modbus_tcp_has_an_address_within_the_ranges_of_its_bus() ->
         ("192.168.2.11", '["everywhere"]', "", "is not IP, IP-IP or NETWORK/BITS"),
         ("192.168.2.11", "[]", "", "is missing or no list of addresses"),
         ("192.168.2.255", '["192.168.2.0/24"]', "", "is not within the ranges"),
-        ("192.168.2.11", '["192.168.2.0/24"]', ", ip = 3", "ip: is no key here"),
+        ("192.168.2.11", '["192.168.2.0/24"]', ", ip = 3", "servo.ip, reason=is no key here"),
     ],
 )
 def test_a_wrong_address_names_its_place(address: str, ranges: str, more: str, reason: str) -> None:
