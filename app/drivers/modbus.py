@@ -138,6 +138,11 @@ class ModbusDriver:
         """Take sizes, time-outs and names of the objects of ``node`` from its description."""
         self._device(node).description = description
 
+    def on_lost(self, callback: Callable[[], None]) -> None:
+        """Have ``callback`` called at once when a connection ends otherwise than by ``close``."""
+        for device in self._devices.values():
+            device.on_lost = callback
+
     @property
     def servers(self) -> Mapping[str, int]:
         """The nodes by ``host:port``, as the passive decoder wants them."""
@@ -238,7 +243,7 @@ class ModbusDriver:
         """Save ``category``, or all, at standstill; see ``modbus_save``."""
         return await modbus_save.save(self._device(node), category, self._now)
 
-    async def bears(self, node: int, stamp: Stamp) -> bool:
+    async def bears(self, node: int, stamp: tuple[int, int]) -> bool:
         """Whether 1020h holds ``stamp``: after a restart, whether that save is in force."""
         return await modbus_save.bears(self._device(node), stamp)
 
