@@ -57,6 +57,8 @@ class CanOpenDriver:
     request, ``consent`` allows active access beside another master.
     """
 
+    ends_when_silent: Final = False
+
     def __init__(
         self,
         config: CanConfig,
@@ -300,7 +302,7 @@ class CanOpenDriver:
         command = command_of(self._saves.get(_checked(node), ()), category)
         await self.write(node, command.address, command.signature.to_bytes(4, "little"), command.timeout_s, Verify.ACK)
 
-    async def bears(self, node: int, stamp: tuple[int, int]) -> bool:  # noqa: ARG002 - no save here has a stamp
+    async def bears(self, node: int, stamp: tuple[int, int]) -> bool:
         """See Driver."""
         return False
 

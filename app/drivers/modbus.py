@@ -67,6 +67,8 @@ def _now() -> datetime:
 class ModbusDriver:
     """The devices of ``config`` as the bus ``bus``. ``stamper`` gives frames their times, ``now`` stamps saves."""
 
+    ends_when_silent: Final = True
+
     def __init__(
         self, config: ModbusConfig, stamper: Stamper, bus: str = "modbus0",
         descriptions: Sequence[Description] = (), now: Callable[[], datetime] = _now,
