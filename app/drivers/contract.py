@@ -113,8 +113,10 @@ class Driver(Protocol):
     """
 
     bus: str
-    ends_when_silent: bool
-    """``read_many`` does not wait for each object of a device that has fallen silent: it asks no further."""
+
+    @property
+    def ends_when_silent(self) -> bool:
+        """Whether ``read_many`` asks no further where a device has fallen silent."""
 
     async def connect(self, timeout_s: float = 5.0) -> None:
         """Open the bus and listen before anything is sent. Raises BusOpenError."""

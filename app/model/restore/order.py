@@ -31,8 +31,8 @@ def order(
     """Writes in their order, with the changes of mode that they need; and the places for which there is no order."""
     walk = Walk(station, rows, rules, options)
     homing = [row for row in rows if walk.mode_needed(row.place) is not None]
-    gates = {row.place: gate for row in rows if (gate := walk.gate_of(row.place)) is not None}
-    closing = {place for place, _ in gates.values()}
+    gates = {row.place: found for row in rows if (found := walk.gate_of(row.place)) is not None}
+    closing = {gate for gate, _ in gates.values()}
     ordinary = [row for row in rows if row not in homing and row.place not in gates and row.place not in closing]
     waiting = _advance(walk, ordinary)
     for gate, opened in dict.fromkeys(gates.values()):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import Callable, Iterable, Mapping
-from typing import Final
+from typing import Any, Final
 
 from app.drivers.contract import LinkState
 from app.errors import (
@@ -353,8 +353,10 @@ class Hands:
             self._log.ended(_state_after(error), error)
             raise Broken(cause_of(error), slug, error) from error
         await self._answers(target)
-        proven = {} if took.proven is None else {"proven": took.proven}
-        self._log.ended(StepState.DONE, took_s=round(took.took_s, 3), **proven)
+        known: dict[str, Any] = {"took_s": round(took.took_s, 3)}
+        if took.proven is not None:
+            known["proven"] = took.proven
+        self._log.ended(StepState.DONE, **known)
         self._boots[slug] = max(before + 1, boots_of(target))
         if target.description.bus is Bus.MODBUS_TCP:
             bus = target.device.bus  # its connection does not outlive the restart that we asked for
