@@ -189,6 +189,7 @@ class RestoreValue(BaseModel):
     device: str
     address: str
     name: str
+    save_category: str | None
     unit: str
     before_raw: RawJson
     wanted_raw: RawJson

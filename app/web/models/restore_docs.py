@@ -228,6 +228,7 @@ def _values(kept: Kept, descriptions: Descriptions) -> list[RestoreValue]:
                 device=value.device,
                 address=parse_address(value.address).short,
                 name=name,
+                save_category=_save_category(descriptions, value.device, value.address),
                 unit=unit,
                 before_raw=_raw(before),
                 wanted_raw=_raw(wanted),
@@ -272,6 +273,12 @@ def _category(step: StepRow, descriptions: Descriptions) -> str | None:
         return None
     entry = parse_address(step.address)
     return next((one.category for one in description.save if one.address == entry), None)
+
+
+def _save_category(descriptions: Descriptions, device: str, address: str) -> str | None:
+    description = descriptions(device)
+    entry = None if description is None else description.entries.get(parse_address(address))
+    return None if entry is None else entry.save_category
 
 
 def _words(kept: Kept, descriptions: Descriptions, device: str, address: str) -> tuple[str, str, Callable[[Raw], str]]:

@@ -8792,6 +8792,8 @@ export interface components {
             device: string;
             /** Name */
             name: string;
+            /** Save Category */
+            save_category: string | null;
             /**
              * State
              * @enum {string}

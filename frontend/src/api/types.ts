@@ -86,6 +86,8 @@ export interface EntryDoc extends QuantityDoc {
   default: RawDoc | null;
   node_id: boolean;
   saved: boolean;
+  /** What saves it, where the device saves by categories; null goes with each save. */
+  save_category: string | null;
   group: string;
   section: string;
   unit_from: { address: string; shaft: string | null; choices: Record<string, QuantityDoc> } | null;
@@ -143,5 +145,6 @@ export interface DescriptionDoc {
   bit_tables: Record<string, BitDoc[]>;
   enumerations: Record<string, EnumerationDoc>;
   errors: ErrorDoc[];
+  save: { address: string; category: string | null }[];
   entries: EntryDoc[];
 }

@@ -17,6 +17,7 @@ const PLAIN: EntryDoc = {
   writable: true,
   default: 500,
   node_id: false,
+  save_category: null,
   saved: true,
   group: "temperatures",
   section: "4.6",
@@ -53,6 +54,7 @@ const DOC: DescriptionDoc = {
     open: { exclusive: false, values: [{ value: 1, name: "one", text_key: "enum.open.one" }] },
   },
   errors: [],
+  save: [],
   entries: [],
 };
 

@@ -2,6 +2,7 @@ import { useQueries } from "@tanstack/react-query";
 import type { EntryDoc } from "../../api/types";
 import { restsOn } from "../../model/values";
 import { type ParameterRow, titleOf } from "../../model/rows";
+import { categoryName } from "../../model/saving";
 import { limitText } from "../../model/shown";
 import { isHex, quantityOf } from "../../model/values";
 import { useBenchOfTable, useDevice } from "./context";
@@ -28,6 +29,7 @@ export function Facts({ row, onOpen }: Props) {
     ["verify", t(`page.verify.${entry.verify}`)],
     ["section", entry.section || "–"],
   ];
+  if (entry.save_category !== null) facts.push(["save_category", categoryName(entry.save_category, t)]);
   const needs = entry.requires.map(({ address, values }) => `${address} = ${values.map(String).join(", ")}`);
   if (needs.length > 0) facts.push(["requires", needs.join("; ")]);
   return (
