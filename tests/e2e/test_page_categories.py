@@ -81,7 +81,9 @@ def test_a_set_is_compared_restored_saved_by_categories_and_found_after_a_restar
     expect(page.get_by_test_id("restore-end-new")).to_be_visible(timeout=RUN_MS)
     for at in CHANGES:
         expect(page.get_by_test_id(f"run-{SERVO} {at}")).to_contain_text("proven")
-    found = load_set(page.evaluate("async (id) => (await fetch(`/api/sets/${id}/download?format=json`)).text()", record), "set")
+    found = load_set(
+        page.evaluate("async (id) => (await fetch(`/api/sets/${id}/download?format=json`)).text()", record), "set"
+    )
     assert differing(found, twin) == []
 
 

@@ -50,6 +50,8 @@ from app.service.write import write_raw
 from app.store.restore_rows import Direction, StepState
 
 DEVICE_TYPE: Final = Address(0x1000)
+UPTIME: Final = Address(0x230F)
+"""Seconds since the start, of a drive of Nanotec."""
 SHUTDOWN: Final = 0x0106
 """Controlword (manual table 52)."""
 _ENABLE_OPERATION: Final = 1 << 3
@@ -202,10 +204,12 @@ class Hands:
         return status is not None and is_driven(status)
 
     async def _answers(self, target: Target) -> None:
+        """Wait until it does. One without a boot-up message tells by its uptime whether it has started anew."""
+        asked = UPTIME if UPTIME in target.description.entries else DEVICE_TYPE
         until = self.monotonic() + self.timing.ready_s
         while True:
             try:
-                await self.connection.driver(target).read(target.node, DEVICE_TYPE)
+                await self.connection.driver(target).read(target.node, asked)
             except BusLostError as error:
                 raise Broken(Cause.BUS_LOST, target.slug, error) from error
             except (NoAnswerError, DeviceError) as error:
