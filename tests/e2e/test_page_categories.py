@@ -6,6 +6,7 @@ import json
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from urllib.parse import parse_qs, urlsplit
 
 import pytest
 from playwright.sync_api import Browser, Page, expect
@@ -77,7 +78,8 @@ def test_a_set_is_compared_restored_saved_by_categories_and_found_after_a_restar
     expect(page.get_by_test_id("what-happens")).to_contain_text("save Application, Drive, Tuning")
     hold(page, "restore-hold")
     expect(page.get_by_test_id("restore-confirm")).to_be_visible(timeout=RUN_MS)
-    hold(page, "confirm-hold")
+    restore = parse_qs(urlsplit(page.url).query)["restore"][0]
+    api(page, "POST", f"/api/live/restores/{restore}/confirm", {})
     expect(page.get_by_test_id("restore-end-new")).to_be_visible(timeout=RUN_MS)
     for at in CHANGES:
         expect(page.get_by_test_id(f"run-{SERVO} {at}")).to_contain_text("proven")
