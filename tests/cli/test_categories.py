@@ -1,4 +1,4 @@
-"""``hubside save``, ``backup``, ``sets diff`` and ``restore`` with the site file of a device that saves by categories."""
+"""``hubside save``, ``backup``, ``sets diff``, ``restore`` with the site file of a device that saves by categories."""
 
 from __future__ import annotations
 
