@@ -323,7 +323,7 @@ def real_routes(scene: HubScene) -> set[tuple[str, str]]:
     bench = bench_with(make_connection())
     guard = create_app(bench, Access(bench.office.sessions, 1), 1, scene)
     found = set()
-    for route in iter_route_contexts(guard._app.routes):  # type: ignore[attr-defined]
+    for route in iter_route_contexts(guard.app.routes):  # type: ignore[attr-defined]
         methods = getattr(route, "methods", None) or {SOCKET}
         found |= {(method, str(route.path)) for method in methods}
     return found
