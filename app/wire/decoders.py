@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Protocol
 
-from app.model.description import Description
+from app.model.description import Bus, Description
 from app.wire.decoder import CanOpenDecoder
 from app.wire.frame import Adu, Frame
 from app.wire.modbus.decoder import ModbusDecoder
@@ -44,8 +44,9 @@ def decoder_of(
     bus: str, descriptions: Mapping[int, Description] | None = None, servers: Mapping[int, str] | None = None
 ) -> BusDecoder:
     """The decoder of ``bus``. ``servers`` are the ``host:port`` of its nodes where it is Modbus TCP, None elsewhere."""
-    if servers is not None:
-        return ModbusDecoder(bus, {server: node for node, server in servers.items()})
+    speaks = {one.bus for one in (descriptions or {}).values()}
+    if servers is not None or Bus.MODBUS_TCP in speaks:
+        return ModbusDecoder(bus, {server: node for node, server in (servers or {}).items()})
     return CanOpenDecoder(bus, descriptions)
 
 
