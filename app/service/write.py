@@ -77,7 +77,7 @@ async def write_raw(
     """
     known = driver.commanded(target.node, address) if known is None else known
     entry = target.entry(address)
-    await target.pass_gate(driver)
+    await target.pass_gate(driver, address)
     await know_what_it_rests_on(driver, target, entry)
     data = await _checked(driver, target, entry, raw, allow)
     was = decode(entry, await driver.read(target.node, address, entry.timeout_s)) if entry.access.readable else None
@@ -89,7 +89,7 @@ async def write_raw(
             found=_shown(target, entry, was),
         )
     shown = {"address": address.short, "name": entry.title, "was": _shown(target, entry, was)}
-    await target.pass_gate(driver)  # once more: what was read meanwhile took its time
+    await target.pass_gate(driver, address)  # once more: what was read meanwhile took its time
     try:
         how = await driver.write(target.node, address, data, entry.timeout_s, entry.verify, known=known)
         read = await _read_back(driver, target, entry, data)

@@ -221,7 +221,7 @@ async def _check_all(rows: Sequence[Row], allow: Allow) -> None:
             return target.lookup(address) if found is None else found
 
         try:
-            await target.pass_gate(change.driver)
+            await target.pass_gate(change.driver, change.address)
             check_write(target.description, target.entry(change.address), change.raw, lookup, allow=allow)
         except HubsideError as error:
             row.state, row.error = RowState.REFUSED, error

@@ -33,6 +33,12 @@ DRIFT_DEG: Final = 0.1
 """More than this is no play."""
 
 
+ERROR_CODE: Final = Address(0x603F)
+_FAULTY: Final = (AxisState.FAULT, AxisState.FAULT_REACTION_ACTIVE)
+HELD_FAST: Final = frozenset({0x8611})
+"""Following error: what an axis tells that has power and does not turn (OAT manual, table 48)."""
+
+
 class BrakeVerdict(Enum):
     """The value is the end of its text key ``brake_verdict.…``."""
 
@@ -99,11 +105,18 @@ async def _turn(running: Running) -> BrakeTest:
         if control.overtaken:
             running.end(Ended.STOPPED)
         elif await control.state() is not AxisState.OPERATION_ENABLED:
-            break  # an axis that cannot turn falls into a fault
+            if not await _held_fast(control):
+                running.end(Ended.STOPPED)
+            break
         await wait(running)
         turned_deg = abs(await control.degrees(POSITION) - start_deg)
     stuck = turned_deg < LEAST_DEG and not running.over.is_set()
     return BrakeTest(BrakeVerdict.STUCK if stuck else None, lifted_s, turned_deg)
+
+
+async def _held_fast(control: Control) -> bool:
+    """The axis has a fault because it did not turn; any other one, or none, says nothing of the brake."""
+    return await control.state() in _FAULTY and await control.number(ERROR_CODE) in HELD_FAST
 
 
 async def _rest(running: Running, so_far: BrakeTest) -> BrakeTest:

@@ -29,6 +29,7 @@ from app.errors import (
     PdoBusyError,
     UsageError,
 )
+from app.model.address import Address
 from app.model.axis_state import AxisState
 from app.service.connection import Connection
 from app.service.devices import Target
@@ -37,18 +38,21 @@ from app.service.motion import interlocks, preparation
 from app.service.motion.control import Control, Word
 from app.service.motion.dead_man import SILENCE_S, DeadMan
 from app.service.motion.heartbeat import Heartbeat
-from app.service.motion.interlocks import Confirmed, Standing
+from app.service.motion.interlocks import Confirmed, Interlock, Standing
 from app.service.motion.lease import Holder, Lease
 from app.service.motion.left import Left
 from app.service.motion.preparation import Prepared
 from app.service.stop import CONTROLWORD, is_axis
 
+UNKNOWN: Final = "–"
 log = logging.getLogger(__name__)
 
 TICK_S: Final = 0.02
 OBEY_S: Final = 0.25
 """An axis that is still enabled so long after a quick stop has not heard it."""
 CLOSE_S: Final = 8.0
+LOOK_AGAIN_S: Final = 0.5
+"""So often it is looked while an axis moves whether an interlock holds it back now."""
 
 
 class Doing(Enum):
@@ -74,12 +78,13 @@ class Ended(Enum):
     SILENT = "silent"
     LEASE = "lease"
     LINK = "link"
+    INTERLOCK = "interlock"
     LIMIT = "limit"
     STOPPED = "stopped"
     FAILED = "failed"
 
 
-_STOPPED: Final = (Ended.SILENT, Ended.LEASE, Ended.LINK)
+_STOPPED: Final = (Ended.SILENT, Ended.LEASE, Ended.LINK, Ended.INTERLOCK)
 """A quick stop was sent already."""
 
 
@@ -151,9 +156,27 @@ class MotionDesk:
             if bus.heartbeat_node is not None
         }
         self._reconnects: dict[str, int] = {}
+        connection.gate.claims.axes = self
         self._ticker: asyncio.Task[None] | None = None
         self._changing = asyncio.Lock()
         self._chores: set[asyncio.Task[None]] = set()
+
+    # -- what others are kept from --------------------------------------------------------
+
+    def keeper(self, device: str, address: Address | None) -> str | None:
+        """See ``service.claims.Axes``. What stands of an earlier server is not to be saved either."""
+        running, holder = self.running, self.lease.holder
+        person = UNKNOWN if holder is None else holder.person
+        if running is not None and running.slug == device:
+            return person
+        changed = self.left.of(device)
+        if device in self.prepared:
+            return person if address is None or address in changed else None
+        return person if address is None and changed and not self._closed else None
+
+    def before(self, device: str) -> dict[Address, bytes]:
+        """See ``service.claims.Axes``."""
+        return {address: changed.was for address, changed in self.left.of(device).items()}
 
     # -- looking after it ---------------------------------------------------------------
 
@@ -365,9 +388,12 @@ class MotionDesk:
         self._order = order
 
     def confirm(self, fence: int, confirmed: Confirmed) -> None:
-        """What the holder has looked at. Raises LeaseNeededError, LeaseError."""
+        """What the holder has looked at; who takes it back stops what moves. Raises LeaseNeededError, LeaseError."""
         self.lease.check(fence)
         self.confirmed = confirmed
+        running = self.running
+        if running is not None and running.held and not (confirmed.rotor_locked and confirmed.people_out):
+            self._stop_running(running, Ended.INTERLOCK)
 
     # -- interlocks and preparation ------------------------------------------------------------
 
@@ -376,6 +402,24 @@ class MotionDesk:
         target = self._axis(slug)
         heartbeat = self._heartbeats.get(target.device.bus)
         return await interlocks.look(self.connection, target, heartbeat, self.confirmed, self.batteries_tested)
+
+    async def _watch_interlocks(self, running: Running) -> None:
+        """Stop what is held as soon as an interlock bites that did not at its beginning.
+
+        But for the rules: only a write could break one, and nobody writes to an axis that moves.
+        """
+        while True:
+            await asyncio.sleep(LOOK_AGAIN_S)
+            try:
+                found = await self.interlocks(running.slug)
+            except HubsideError as error:
+                log.info("%s: interlocks cannot be looked at: %s", running.slug, error.code)
+                continue
+            if running.over.is_set() or not running.held:
+                return
+            if any(one.holds_back for one in found if one.interlock is not Interlock.RULES):
+                self._stop_running(running, Ended.INTERLOCK)
+                return
 
     async def require_clear(self, slug: str) -> None:
         """Raises InterlockError for the first interlock that holds the axis back."""
@@ -559,6 +603,7 @@ class MotionDesk:
         running = self.running = Running(slug, doing, control, held, order)
         journal = self._journal.by(holder.person)
         error: HubsideError | None = None
+        watch: asyncio.Task[None] | None = None
         try:
             await self.require_clear(slug)
             await self._require_no_feather(control)
@@ -567,6 +612,8 @@ class MotionDesk:
                 raise NotHeldError(device=slug)
             journal.note(Kind.MOTION_BEGUN, slug, what=doing.value)
             running.task = asyncio.ensure_future(_as_none(work(running)))
+            if held:
+                watch = asyncio.create_task(self._watch_interlocks(running))
             await asyncio.shield(running.task)
             running.end(Ended.DONE)
         except BaseException as failed:  # whatever it is: nobody looks after the axis any more
@@ -576,6 +623,8 @@ class MotionDesk:
             running.end(Ended.FAILED)
             raise
         finally:
+            if watch is not None:
+                watch.cancel()
             if running.task is not None and not running.task.done():
                 running.task.cancel()  # whoever waited for it is gone
             self.running = None
@@ -615,7 +664,7 @@ class MotionDesk:
         link = self.connection.buses[target.device.bus]
         return Control(
             link.driver,
-            target,
+            target.past_claims(),
             lambda data: link.send_pdo(target.node, CONTROLWORD, data),
             lambda mode: self.left.note_mode_set(target.slug, mode),
         )

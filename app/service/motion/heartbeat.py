@@ -23,7 +23,7 @@ class Heartbeat:
     def __init__(self, driver: Any, node: int, monotonic_s: Callable[[], float]) -> None:
         self.node = node
         self._driver = driver
-        self._now_s = monotonic_s
+        self.now_s = monotonic_s
         self._watching: set[str] = set()
         self._withheld: set[str] = set()
         self._cut = False
@@ -69,7 +69,7 @@ class Heartbeat:
 
     def tick(self) -> None:
         """Send when it is time."""
-        if self._watching and not self._withheld and not self._cut and self._now_s() - self._last_s >= PERIOD_S:
+        if self._watching and not self._withheld and not self._cut and self.now_s() - self._last_s >= PERIOD_S:
             self._send()
 
     def _send(self) -> None:
@@ -78,4 +78,4 @@ class Heartbeat:
         except HubsideError as error:  # the link is gone: the drives stop by themselves
             log.debug("heartbeat: %s", error.code)
             return
-        self._last_s = self._now_s()
+        self._last_s = self.now_s()

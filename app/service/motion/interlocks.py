@@ -27,6 +27,8 @@ from app.service.views import STALE_NS, AxisLine, axis_lines
 POSITION: Final = Address(0x6064)
 ASK_TIMEOUT_S: Final = 0.5
 FEATHER_DEG: Final = 75.0
+BEYOND_DEG: Final = 105.0
+"""No blade is in feather there: its position is wrong, after a lost homing say."""
 """A blade at this angle or beyond is in feather: the rotor does not take up wind by it."""
 
 
@@ -146,9 +148,13 @@ def _others(connection: Connection, target: Target) -> Standing:
         for line in axis_lines(connection.turbine, by_slug, connection.stamper())
         if line.station != own and _has_axis(connection, line)
     ]
-    out = [line for line in lines if line.stale or line.position_deg is None or line.position_deg < FEATHER_DEG]
+    out = [
+        line
+        for line in lines
+        if line.stale or line.position_deg is None or not FEATHER_DEG <= line.position_deg <= BEYOND_DEG
+    ]
     blades = ", ".join(str(line.blade) for line in out) or "–"
-    return Standing(Interlock.OTHERS_FEATHERED, bool(out), {"blades": blades, "angle": FEATHER_DEG})
+    return Standing(Interlock.OTHERS_FEATHERED, bool(out), {"blades": blades, "angle": FEATHER_DEG, "most": BEYOND_DEG})
 
 
 def _has_axis(connection: Connection, line: AxisLine) -> bool:
@@ -163,7 +169,8 @@ def _rules(targets: Iterable[Target], target: Target) -> Standing:
 
 async def _restore(connection: Connection, target: Target) -> Standing:
     try:
-        await target.pass_gate(connection.driver(target))
+        await target.require_no_restore(connection.driver(target))
+        target.gate.claims.require_unclaimed(target.slug)
     except HubsideError:
         return Standing(Interlock.NO_RESTORE, True, {})
     return Standing(Interlock.NO_RESTORE, False, {})

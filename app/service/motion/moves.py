@@ -31,7 +31,7 @@ LOWEST: Final = Address(0x607D, 1)
 HIGHEST: Final = Address(0x607D, 2)
 MOST_DPS: Final = 5.0
 """The fastest that a person moves a blade by hand."""
-STOPPING: Final = (Ended.SILENT, Ended.LEASE, Ended.LINK)
+STOPPING: Final = (Ended.SILENT, Ended.LEASE, Ended.LINK, Ended.INTERLOCK)
 """A quick stop is under way."""
 _LOOK_S: Final = 0.02
 _HOME_TOLERANCE_DEG: Final = 0.1

@@ -147,7 +147,6 @@ async def prove(axis: Prepared, heartbeat: Heartbeat, held: Callable[[], bool]) 
     Raises InterlockError where it went on, NotHeldError where it was let go meanwhile.
     """
     control = axis.control
-    loop = asyncio.get_running_loop()
     axis.proof_s = None
     await control.set_mode(AxisMode.PROFILE_VELOCITY)
     try:
@@ -159,10 +158,10 @@ async def prove(axis: Prepared, heartbeat: Heartbeat, held: Callable[[], bool]) 
         while await control.state() is AxisState.OPERATION_ENABLED:
             if not held():
                 raise NotHeldError(device=axis.slug)
-            if loop.time() - last_s > PROOF_S:
+            if heartbeat.now_s() - last_s > PROOF_S:
                 raise _not_proven(axis, "still_enabled", PROOF_S)
             await asyncio.sleep(_LOOK_S)
-        took_s = loop.time() - last_s
+        took_s = heartbeat.now_s() - last_s
         control.require_own()  # a STOP proves nothing
         if not held():
             raise NotHeldError(device=axis.slug)
