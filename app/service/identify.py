@@ -1,10 +1,10 @@
-"""Asks given addresses of Modbus TCP who they are: those that a person names, each by itself, never a network."""
+"""Asks given addresses of Modbus TCP who they are: those that a person names, one by one, never a network."""
 
 from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -12,10 +12,14 @@ from app.drivers.contract import FoundNode
 from app.drivers.modbus_config import ModbusConfig, ModbusPeer
 from app.drivers.scan import match
 from app.drivers.table import driver_class
-from app.errors import BusOpenError, DeviceError, HubsideError, NoAnswerError, ProtocolError
+from app.errors import BusOpenError, DeviceError, HubsideError, NoAnswerError, ProtocolError, SettingsError
 from app.model.address import Address
 from app.model.description import Bus, Description
+from app.model.servers import Server, parse_range
+from app.model.site import Turbine
 from app.model.variant import as_variant
+from app.service.connection import Connection
+from app.service.jobs import Job
 from app.wire.frame import Stamper
 
 OPEN_S: Final = 3.0
@@ -80,12 +84,39 @@ async def _serial(driver: Any, description: Description | None, found: FoundNode
     """A number as a text, where the device has one; else that of its identity object."""
     if description is not None and SERIAL in description.entries:
         try:
-            text = (await driver.read(found.node, SERIAL)).rstrip(b"\0").decode("latin-1").strip()
+            data: bytes = await driver.read(found.node, SERIAL)
+            text = data.rstrip(b"\0").decode("latin-1").strip()
         except (DeviceError, NoAnswerError, ProtocolError):
             text = ""
         if text:
             return text
     return str(found.identity.serial) if found.identity.serial else None
+
+
+def within(turbines: Iterable[Turbine], server: Server) -> bool:
+    """Whether a bus of the site allows the address."""
+    buses = (bus for turbine in turbines for bus in turbine.buses)
+    return any(parse_range(text).holds(server) for bus in buses for text in bus.ranges)
+
+
+async def ask_address(
+    job: Job, server: Server, turbines: Iterable[Turbine], known: Sequence[Description], connection: Connection | None
+) -> None:
+    """Ask one address of the site, through the open connection where it has the device; the job's result is Asked.
+
+    Raises SettingsError where no bus of the site allows the address (nothing is sent then), NoAnswerError.
+    """
+    if not within(turbines, server):
+        raise SettingsError(reason_key="settings.refused.not_in_ranges", address=server.text)
+    links = [] if connection is None else connection.buses.values()
+    link = next((one for one in links if one.kind is Bus.MODBUS_TCP and server.text in one.driver.servers), None)
+    if link is None:
+        (asked,) = await identify(ModbusConfig((ModbusPeer(1, *server),)), known, server.text)
+    else:
+        asked = await ask_with(link.driver, ModbusPeer(link.driver.servers[server.text], *server), known)
+    if asked.error is not None:
+        raise asked.error
+    job.result = asked
 
 
 def silent(peer: ModbusPeer) -> NoAnswerError:
