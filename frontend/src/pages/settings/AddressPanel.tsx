@@ -78,7 +78,7 @@ export function AddressPanel({ bus, draft, site, onAdded }: Props) {
           onChange={(value) => typedNumber(value, (unit) => move({ ...place, unit }))}
           data-testid="new-unit"
         />
-        <div style={{ marginTop: 25 }}>
+        <div style={{ marginTop: 22 }}>
           <NeedsRole role="technician" device>
             {(locked) => (
               <Button

@@ -123,7 +123,7 @@ function BusRow({ bus, fixed, onChange, onRemove, scanning, onScan }: RowProps) 
       />
       {tcp ? <RangeFields bus={bus} onChange={onChange} /> : <CanFields bus={bus} onChange={onChange} />}
       <Button
-        mt={25}
+        mt={22}
         variant={scanning ? "filled" : "default"}
         aria-expanded={scanning}
         leftSection={tcp ? <IconPlus size={18} aria-hidden /> : <IconRadar2 size={18} aria-hidden />}
@@ -135,7 +135,7 @@ function BusRow({ bus, fixed, onChange, onRemove, scanning, onScan }: RowProps) 
       </Button>
       <Tooltip label={t("page.settings.turbines.remove_bus", { bus: bus.name })}>
         <ActionIcon
-          mt={25}
+          mt={22}
           aria-label={t("page.settings.turbines.remove_bus", { bus: bus.name })}
           onClick={onRemove}
         >
