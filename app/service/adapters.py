@@ -124,6 +124,8 @@ async def overview(turbines: Iterable[Turbine], connection: Connection | None) -
     named: dict[str, list[str]] = {}
     for turbine in turbines:
         for bus in turbine.buses:
+            if bus.kind is not Bus.CANOPEN:
+                continue  # its devices are reached by their own addresses, through no adapter
             try:
                 plain = adapter(bus.connection).connection
             except UsageError:
@@ -144,7 +146,8 @@ def in_use(connection: Connection | None, text: str) -> BusLink | None:
     if connection is None:
         return None
     wanted = _place(parse_can(text))
-    return next((link for link in connection.buses.values() if _place(parse_can(link.adapter)) == wanted), None)
+    can = (link for link in connection.buses.values() if link.kind is Bus.CANOPEN)
+    return next((link for link in can if _place(parse_can(link.adapter)) == wanted), None)
 
 
 def _place(config: CanConfig) -> tuple[CanInterface, str, str, int]:

@@ -12,7 +12,7 @@ import hashlib
 import os
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -21,7 +21,8 @@ from app.drivers.contract import FoundNode
 from app.errors import SettingsError, SiteError, UsageError
 from app.model.description import Bus, Description
 from app.model.description_file import BUILTIN
-from app.model.site import BusConfig, Device, Station, Turbine, read_site
+from app.model.servers import MODBUS
+from app.model.site import HEARTBEAT_NODE, BusConfig, Device, Station, Turbine, read_site
 from app.service.journal import Journal, Kind
 from app.service.polling import changes_text
 from app.service.sites import Sites
@@ -148,6 +149,7 @@ class SiteEditor:
         from app.model.site_write import with_turbine
 
         path = self._writable()
+        check_kinds(turbine, str(path))
         text = with_turbine(self._begun(), turbine, str(path))
         check_turbine(turbine, self._sites.describe, str(path))
         await self._write(path, text)
@@ -196,8 +198,10 @@ def check_turbine(turbine: Turbine, describe: Any, file: str) -> None:
     _name(turbine.name, f"{where}name", file)
     if not turbine.buses:
         raise SiteError(file=file, key=f"{where}bus", reason="no bus is named")
+    kinds = {bus.name: bus.kind for bus in turbine.buses}
     for bus in turbine.buses:
-        _adapter(bus, f"{where}bus.{bus.name}.", file)
+        if bus.kind is Bus.CANOPEN:
+            _adapter(bus, f"{where}bus.{bus.name}.", file)
     known: Mapping[str, Description] = describe(turbine)
     for station in turbine.stations:
         at = f"{where}station.{station.slug.split('/', 1)[1]}."
@@ -209,9 +213,33 @@ def check_turbine(turbine: Turbine, describe: Any, file: str) -> None:
             if description is None:
                 reason = f"there is no description '{device.description_id}' (there are: {', '.join(sorted(known))})"
                 raise SiteError(file=file, key=f"{own}description", reason=reason)
-            if description.bus is not Bus.CANOPEN:
-                reason = f"{description.id} is no device of a CAN bus"
+            if description.bus is not kinds[device.bus]:
+                reason = f"{description.id} is no device of a bus with {kinds[device.bus].value}"
                 raise SiteError(file=file, key=f"{own}description", reason=reason)
+
+
+def check_kinds(turbine: Turbine, file: str) -> None:
+    """What only a bus of the other kind has would be left out of the file. Raises SiteError with the key."""
+    for bus in turbine.buses:
+        key, reason = f"turbine.{turbine.slug}.bus.{bus.name}", f"is not for a bus with connection '{MODBUS}'"
+        if bus.kind is Bus.CANOPEN and bus.ranges:
+            raise SiteError(file=file, key=f"{key}.ranges", reason=f"is for a bus with connection '{MODBUS}'")
+        if bus.kind is Bus.MODBUS_TCP and bus.bitrate:
+            raise SiteError(file=file, key=f"{key}.bitrate", reason=reason)
+        if bus.kind is Bus.MODBUS_TCP and bus.heartbeat_node != HEARTBEAT_NODE:
+            raise SiteError(file=file, key=f"{key}.heartbeat_node", reason=reason)
+
+
+def stops_of(turbine: Turbine | None) -> dict[str, tuple[str, str, str]]:
+    """What is said to stop each axis from outside, and of which device that was said: its bus and address."""
+    devices = () if turbine is None else turbine.devices
+    return {one.slug: (one.external_stop, one.bus, one.address) for one in devices if one.external_stop}
+
+
+def changes_a_stop(before: Turbine | None, after: Turbine) -> bool:
+    """Whether another stop is named for an axis, or the same one for another device; taking it out is none."""
+    known = stops_of(before)
+    return any(known.get(slug) != stop for slug, stop in stops_of(after).items())
 
 
 def _name(name: str, key: str, file: str) -> None:
@@ -256,12 +284,20 @@ def _document(turbine: Turbine | None) -> dict[str, Any]:
         }
         for station in turbine.stations
     }
-    buses = {bus.name: f"{bus.connection}@{bus.bitrate}" for bus in turbine.buses}
+    buses = {bus.name: _bus_text(bus) for bus in turbine.buses}
     return {"name": turbine.name, "bus": buses, "station": stations}
 
 
+def _bus_text(bus: BusConfig) -> str:
+    if bus.kind is Bus.MODBUS_TCP:
+        return f"{bus.connection} {', '.join(bus.ranges)}"
+    return f"{bus.connection}@{bus.bitrate}"
+
+
 def _device_text(device: Device) -> str:
-    return f"{device.name}, {device.description_id}, {device.bus} node {device.node}"
+    text = f"{device.name}, {device.description_id}, {device.bus} node {device.node}"
+    address = f" at {device.address}" if device.address else ""
+    return text + address + (f", stopped by {device.external_stop}" if device.external_stop else "")
 
 
 # -- found devices ------------------------------------------------------------------------
@@ -295,9 +331,7 @@ def turbine_of(
             f"{slug}/{at}",
             title,
             blade,
-            tuple(
-                Device(f"{slug}/{at}/{one.slug}", one.name, one.description_id, one.bus, one.node) for one in devices
-            ),
+            tuple(replace(one, slug=f"{slug}/{at}/{one.slug}") for one in devices),
         )
         for at, title, blade, devices in stations
     )

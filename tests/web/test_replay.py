@@ -77,6 +77,7 @@ REFUSED_IN_REPLAY = {
     ("POST", "/api/settings/adapters/test"),
     ("POST", "/api/settings/adapters/bitrate"),
     ("POST", "/api/settings/scan"),
+    ("POST", "/api/settings/identify"),
     ("PUT", "/api/settings/polling"),
 }
 """What reaches a bus or a twin, but STOP and FEATHER, which must always go."""

@@ -241,6 +241,7 @@ ROUTES: Final[dict[tuple[str, str], Role]] = {
     ("POST", "/api/settings/adapters/test"): TECHNICIAN,
     ("POST", "/api/settings/adapters/bitrate"): TECHNICIAN,
     ("POST", "/api/settings/scan"): TECHNICIAN,
+    ("POST", "/api/settings/identify"): TECHNICIAN,
     ("GET", "/api/settings/jobs/{job_id}"): VIEWER,
     ("GET", "/api/settings/site"): VIEWER,
     ("POST", "/api/settings/site/turbines"): TECHNICIAN,

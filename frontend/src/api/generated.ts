@@ -3504,6 +3504,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/settings/identify": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Start Identify
+         * @description Ask exactly this address of Modbus TCP who is there; a bus of the site must allow it.
+         */
+        post: operations["start_identify"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/settings/jobs/{job_id}": {
         parameters: {
             query?: never;
@@ -3619,7 +3639,7 @@ export interface paths {
         put?: never;
         /**
          * Add Turbine
-         * @description Add a turbine to the site file.
+         * @description Add a turbine to the site file; one that says what stops an axis from outside is an expert's.
          */
         post: operations["add_turbine"];
         delete?: never;
@@ -3638,7 +3658,7 @@ export interface paths {
         get?: never;
         /**
          * Change Turbine
-         * @description Change a turbine of the site file; slugs are permanent.
+         * @description Change a turbine of the site file; slugs are permanent. What stops an axis from outside is changed by experts.
          */
         put: operations["change_turbine"];
         post?: never;
@@ -4456,7 +4476,8 @@ export interface components {
          * BusDoc
          * @description A bus of a turbine; ``bitrate`` 0: the connection names it.
          *
-         *     ``heartbeat_node``: as whom this tool beats on it while axes are moved.
+         *     ``heartbeat_node``: as whom this tool beats on it while axes are moved. ``connection`` ``modbus-tcp``: its devices
+         *     have addresses, all within ``ranges``; it has no bit rate (0) then.
          */
         BusDoc: {
             /** Bitrate */
@@ -4470,6 +4491,11 @@ export interface components {
             heartbeat_node: number;
             /** Name */
             name: string;
+            /**
+             * Ranges
+             * @default []
+             */
+            ranges: string[];
         };
         /**
          * BusIdentifier
@@ -5031,9 +5057,14 @@ export interface components {
         };
         /**
          * DescriptionRef
-         * @description A description that devices may name.
+         * @description A description that devices of a bus of this kind may name.
          */
         DescriptionRef: {
+            /**
+             * Bus
+             * @enum {string}
+             */
+            bus: "canopen" | "modbus-tcp";
             /** Id */
             id: string;
             /** Name */
@@ -5856,6 +5887,39 @@ export interface components {
             fence: number;
             /** Order */
             order: number;
+        };
+        /**
+         * IdentifiedDoc
+         * @description The device at an address, as it says itself; null where it does not say. ``twin``: it is simulated.
+         */
+        IdentifiedDoc: {
+            /** Address */
+            address: string;
+            /** Description Id */
+            description_id: string | null;
+            /** Device Name */
+            device_name: string | null;
+            /** Hardware */
+            hardware: string | null;
+            /** Serial */
+            serial: string | null;
+            /** Software */
+            software: string | null;
+            /** Twin */
+            twin: boolean;
+            /** Variant */
+            variant: string | null;
+        };
+        /**
+         * IdentifyRequest
+         * @description One address of Modbus TCP, HOST[:PORT][/UNIT]; a bus of the site must allow it.
+         * @example {
+         *       "address": "192.168.2.20"
+         *     }
+         */
+        IdentifyRequest: {
+            /** Address */
+            address: string;
         };
         /**
          * InForce
@@ -7870,6 +7934,8 @@ export interface components {
         /**
          * PollBus
          * @description A bus of a known turbine, and how much of its time polling takes (0..1); ``counts`` of devices by description.
+         *
+         *     One without a bit rate (0), as of Modbus TCP, has no such share: null.
          */
         PollBus: {
             /** Bitrate */
@@ -7881,7 +7947,7 @@ export interface components {
                 [key: string]: number;
             };
             /** Load */
-            load: number;
+            load: number | null;
             /** Turbine */
             turbine: string;
         };
@@ -9474,7 +9540,9 @@ export interface components {
         };
         /**
          * SettingsJobDoc
-         * @description Work on an adapter. One of ``heard``, ``search`` and ``scan`` is given as soon as there is anything to tell.
+         * @description Work on an adapter or an address.
+         *
+         *     One of ``heard``, ``search``, ``scan`` and ``identified`` is given as soon as there is anything to tell.
          */
         SettingsJobDoc: {
             /** Done */
@@ -9483,6 +9551,7 @@ export interface components {
             heard: components["schemas"]["HeardDoc"] | null;
             /** Id */
             id: string;
+            identified: components["schemas"]["IdentifiedDoc"] | null;
             /** Kind */
             kind: string;
             scan: components["schemas"]["ScanDoc"] | null;
@@ -9791,12 +9860,25 @@ export interface components {
         /**
          * SiteDeviceDoc
          * @description A device; ``slug`` is its own part of the path.
+         *
+         *     ``address`` (HOST[:PORT][/UNIT]) is where it listens on Modbus TCP. ``external_stop`` says what stops this axis from
+         *     outside where its bus cannot prove that it stops by itself; experts change it.
          */
         SiteDeviceDoc: {
+            /**
+             * Address
+             * @default
+             */
+            address: string;
             /** Bus */
             bus: string;
             /** Description Id */
             description_id: string;
+            /**
+             * External Stop
+             * @default
+             */
+            external_stop: string;
             /** Name */
             name: string;
             /** Node */
@@ -24698,6 +24780,71 @@ export interface operations {
                  *     }
                  */
                 "application/json": components["schemas"]["TestRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SettingsJobDoc"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    start_identify: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "address": "192.168.2.20"
+                 *     }
+                 */
+                "application/json": components["schemas"]["IdentifyRequest"];
             };
         };
         responses: {
