@@ -25,6 +25,7 @@ export type WritesRequest = Schemas["WritesRequest"];
 export type WriteResult = Schemas["WriteDone"];
 export type SaveResult = Schemas["SaveDone"];
 export type RestartResult = Schemas["RestartDone"];
+export type VerifyResult = Schemas["VerifyDone"];
 export type StopResult = Schemas["StopDone"];
 
 export type ServerMessage = Schemas["ServerMessage"];
