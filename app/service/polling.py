@@ -62,7 +62,7 @@ CONDITIONS: Final = tuple(map(parse_address, ("4014:01", "4014:03", "4014:04")))
 """Supply and temperatures of a drive that has no objects of the profile for them."""
 SI_UNIT: Final = parse_address("60A8")
 UNITS: Final = tuple(map(parse_address, ("60A8", "60A9", "6091:01", "6091:02", "6092:01", "6092:02")))
-"""Where units are chosen on the device, no value says anything without these: they must be known again after a restart."""
+"""Where a device chooses its units, no value says anything without these: they must be known again after a restart."""
 
 
 class Rate(Enum):

@@ -73,8 +73,8 @@ _COMPLAINTS: Final = ((STATUSWORD, 1 << 7, 1 << 3), (Address(0x3000), 1 << 1, 1 
 class NodeLine:
     """One device as network management sees it. ``silent``: its heartbeat is overdue, so its state is unknown.
 
-    Not ``managed``: its bus has neither states nor heartbeats; then ``answered_t_ns``, the latest answer that it gave to
-    anybody, tells that it is there.
+    Not ``managed``: its bus has neither states nor heartbeats; then ``answered_t_ns``, the latest answer that it gave
+    to anybody, tells that it is there.
     """
 
     device: str

@@ -73,8 +73,8 @@ async def write_raw(
     ``expected`` is what the change was made from; where RAM holds another value, nothing is written (ConflictError).
     ``known``: urgent commands to the object when the write was decided on (``Driver.commanded``), by default those
     there are now; where another one comes before it leaves, nothing is written (OvertakenError).
-    Raises RefusedError (nothing was sent; AddressChangeError: it needs a confirmation), DeviceError (the device refused), NoAnswerError, or UnverifiedError (sent,
-    but another value was read back, or none).
+    Raises RefusedError (nothing was sent; AddressChangeError: it needs a confirmation), DeviceError (the device
+    refused), NoAnswerError, or UnverifiedError (sent, but another value was read back, or none).
     """
     known = driver.commanded(target.node, address) if known is None else known
     entry = target.entry(address)

@@ -1,9 +1,10 @@
-"""What the page needs of a drive on Modbus TCP: where it is found, what differs from its description, that it answers."""
+"""What the page needs of a drive on Modbus TCP: where it is, what differs from its description, that it answers."""
 
 from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,7 @@ import pytest
 from app.errors import AddressChangeError, UsageError
 from app.model.address import Address
 from app.model.checks import Allow, check_write
+from app.model.datatypes import DataType
 from app.model.description_file import load_builtin
 from app.model.site import read_site
 from app.service.address_change import address_changes
@@ -27,7 +29,7 @@ from app.service.write_many import Change, OnFailure, Order, prepare, write_many
 from tests.drivers.modbus_rig import twin
 
 CONFIGURATION, STATIC, MASK, MODULES = Address(0x2010), Address(0x2011), Address(0x2012), Address(0x2102)
-WINDOW = Address(0x6065)
+WINDOW, POLES = Address(0x6065), Address(0x2030)
 IP = 0xC0A80015  # 192.168.0.21
 MASK_24 = 0xFFFFFF00
 
@@ -113,19 +115,20 @@ async def test_the_twin_is_as_it_is_described_and_a_drive_that_is_not_is_told(
     done = await verify(connection.driver(target), target, connection.journal, connection.stamper)
     assert done.objects == len(target.description.entries)
     # Nothing but the categories in which it has nothing to save, which it says itself.
-    assert {(one.address.major, one.deviation.value) for one in done.findings} == {(0x1010, "not_ready")}
+    assert {(one.address.major, one.deviation.value) for one in done.findings} == {
+        (0x1010, "not_ready"),
+        (0x1011, "not_ready"),
+    }
     noted = [entry for entry in connection.journal.latest() if entry.kind is Kind.VERIFIED]
     assert [(entry.device, entry.details["count"]) for entry in noted] == [(target.slug, len(done.findings))]
     as_made = set(done.findings)
-    # A mapping of something that is not described is one that its screens must not trust.
-    driver = connection.driver(target)
-    count = await driver.read(1, Address(0x3602))
-    await driver.write(1, Address(0x3602), b"\0")
-    await driver.write(1, Address(0x3602, 1), (0x60410008).to_bytes(4, "little"))
-    await driver.write(1, Address(0x3602), count)
-    done = await verify(driver, target, connection.journal, connection.stamper)
-    (found,) = set(done.findings) - as_made
-    assert (found.address.short, found.deviation.value, found.expected, found.found) == ("3602:01", "mapping", 16, 8)
+    # Now it is described otherwise than it is made: one object is smaller there, and another one does not exist.
+    entries = {address: entry for address, entry in target.description.entries.items() if address != POLES}
+    entries[WINDOW] = replace(entries[WINDOW], type=DataType.UNSIGNED16)
+    connection.driver(target)._devices[1].description = replace(target.description, entries=entries)
+    done = await verify(connection.driver(target), target, connection.journal, connection.stamper)
+    found = {(one.address, one.deviation.value, one.expected, one.found) for one in set(done.findings) - as_made}
+    assert found == {(WINDOW, "size", 2, 4), (POLES, "extra", None, 4)}
 
 
 async def test_a_bus_that_gives_no_whole_dictionary_says_so(servo: tuple[Connection, Target]) -> None:

@@ -12,6 +12,7 @@ import { useDescriptionQuery, useTurbineQuery } from "../../api/queries";
 import type { Details, Turbine } from "../../api/types";
 import { type PageSearch, roomSearch } from "../../frame/search";
 import { useAxes, useHearing, useLink, useNodes, useServerNow, useStore } from "../../live/live";
+import { asVariant, variantOf } from "../../model/variant";
 import { type Translate, useTexts } from "../../texts/texts";
 import { placesOf } from "../../ui/devices";
 import { rawAt } from "../../ui/reading";
@@ -79,7 +80,8 @@ function useWatched(turbine: Turbine | undefined, t: Translate): Watched[] {
     const cells = store.cells(slug);
     if (!doc || !cells) return [];
     const lookup = (address: string) => rawAt(store, slug, address);
-    return [{ station, context: { slug, node, doc, t, lookup }, cells }];
+    const own = asVariant(doc, variantOf(doc, lookup));
+    return [{ station, context: { slug, node, doc: own, t, lookup }, cells }];
   });
 }
 

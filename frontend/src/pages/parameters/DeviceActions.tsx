@@ -57,11 +57,11 @@ export function DeviceActions() {
           variant="default"
           leftSection={<IconListCheck size={17} aria-hidden />}
           disabled={barred}
-          title={t("page.verify.open_title")}
+          title={t("page.device_check.open_title")}
           onClick={() => setDialog(Dialog.Verify)}
           data-testid="verify"
         >
-          {t("page.verify.open")}
+          {t("page.device_check.open")}
         </Button>
       )}
       {dialog === Dialog.Verify && <VerifyDialog onClose={close} />}

@@ -28,17 +28,19 @@ export function VerifyDialog({ onClose }: { onClose: () => void }) {
       opened
       onClose={onClose}
       size={760}
-      title={<Text fw={700}>{t("page.verify.title", { device })}</Text>}
+      title={<Text fw={700}>{t("page.device_check.title", { device })}</Text>}
       data-testid="verify-dialog"
     >
       <Stack gap="md">
         {result.isPending && (
           <Group role="status">
             <Loader size="sm" aria-hidden />
-            {t("page.verify.running", { device })}
+            {t("page.device_check.running", { device })}
           </Group>
         )}
-        {result.isError && <ProblemAlert error={result.error} title={t("page.verify.failed", { device })} />}
+        {result.isError && (
+          <ProblemAlert error={result.error} title={t("page.device_check.failed", { device })} />
+        )}
         {result.data && <Findings result={result.data} />}
         <Group justify="flex-end">
           <Button variant="default" onClick={onClose} data-autofocus>
@@ -58,7 +60,7 @@ function Findings({ result: { objects, findings } }: { result: VerifyResult }) {
   if (findings.length === 0) {
     return (
       <Alert color="green" role="status" icon={<IconCircleCheck aria-hidden />} data-testid="verify-none">
-        {t("page.verify.none", { objects })}
+        {t("page.device_check.none", { objects })}
       </Alert>
     );
   }
@@ -69,16 +71,16 @@ function Findings({ result: { objects, findings } }: { result: VerifyResult }) {
   return (
     <>
       <Alert color="orange" role="status" icon={<IconAlertTriangle aria-hidden />} data-testid="verify-some">
-        {t("page.verify.some", { count: findings.length, objects })}
+        {t("page.device_check.some", { count: findings.length, objects })}
       </Alert>
       <ScrollArea.Autosize mah={MOST_HEIGHT}>
         <Table stickyHeader>
           <Table.Thead>
             <Table.Tr>
-              <Table.Th>{t("page.verify.column_object")}</Table.Th>
-              <Table.Th>{t("page.verify.column_how")}</Table.Th>
-              <Table.Th>{t("page.verify.column_expected")}</Table.Th>
-              <Table.Th>{t("page.verify.column_found")}</Table.Th>
+              <Table.Th>{t("page.device_check.column_object")}</Table.Th>
+              <Table.Th>{t("page.device_check.column_how")}</Table.Th>
+              <Table.Th>{t("page.device_check.column_expected")}</Table.Th>
+              <Table.Th>{t("page.device_check.column_found")}</Table.Th>
             </Table.Tr>
           </Table.Thead>
           <Table.Tbody>
@@ -87,7 +89,7 @@ function Findings({ result: { objects, findings } }: { result: VerifyResult }) {
                 <Table.Td>
                   {one.address} {nameOf(one.address)}
                 </Table.Td>
-                <Table.Td>{t(`page.verify.deviation.${one.deviation}`)}</Table.Td>
+                <Table.Td>{t(`page.device_check.deviation.${one.deviation}`)}</Table.Td>
                 <Table.Td>{one.expected ?? "–"}</Table.Td>
                 <Table.Td>{one.found ?? "–"}</Table.Td>
               </Table.Tr>
