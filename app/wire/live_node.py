@@ -41,8 +41,8 @@ class LiveNode:
 
     __slots__ = (
         "answered_ns", "boot_ns", "boots", "bus", "commanded", "emcy_code", "emcy_ns", "first_interval_ns",
-        "heartbeat_ns", "interval_ns", "memory", "number", "other_client_ns", "period_ns", "reset_communication", "seen", "silent",
-        "state", "version",
+        "heartbeat_ns", "interval_ns", "memory", "number", "other_client_ns", "period_ns", "reset_communication",
+        "seen", "silent", "state", "version",
     )  # fmt: skip
 
     def __init__(self, bus: str, number: int) -> None:

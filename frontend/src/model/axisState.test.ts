@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { axisStateKey, severityOf } from "./axisState";
+import { axisStateKey, severityOf, shaftLook } from "./axisState";
 
 describe("statusword", () => {
   it("tells the state whatever the other bits are", () => {
@@ -14,5 +14,14 @@ describe("statusword", () => {
     expect(severityOf(0x02b7)).toBe("warning");
     expect(severityOf(0x0288)).toBe("error");
     expect(severityOf(null)).toBe("error");
+  });
+
+  it("looks like the worst that is known", () => {
+    expect(shaftLook(0x0237, 0)).toBe("enabled");
+    expect(shaftLook(0x02b7, 0x8612)).toBe("warning");
+    expect(shaftLook(0x0217, 0)).toBe("warning");
+    expect(shaftLook(0x0237, 0x8611)).toBe("fault");
+    expect(shaftLook(0x0218, null)).toBe("fault");
+    expect(shaftLook(null, null)).toBe("idle");
   });
 });

@@ -35,3 +35,17 @@ export function severityOf(statusword: number | null): "warning" | "error" {
     ? "warning"
     : "error";
 }
+
+const FAULT_STATES = ["axis_state.fault", "axis_state.fault_reaction_active"];
+
+/** How an axis looks whose values are known and fresh, the worst first; the 3D view goes by the same. */
+export function shaftLook(
+  statusword: number | null,
+  errorCode: number | null,
+): "fault" | "warning" | "enabled" | "idle" {
+  const state = statusword === null ? null : axisStateKey(statusword);
+  const complaint = errorCode === null || errorCode === 0 ? null : severityOf(statusword);
+  if (complaint === "error" || (state !== null && FAULT_STATES.includes(state))) return "fault";
+  if (complaint === "warning" || state === "axis_state.quick_stop_active") return "warning";
+  return state === "axis_state.operation_enabled" ? "enabled" : "idle";
+}
