@@ -90,7 +90,9 @@ function SceneView() {
   const view = useView(cameras);
   // The frame gets its first view by its address; what changes later it is told, without being loaded again.
   const { ctx } = useShown();
-  const [address] = useState(() => addressOf(view, ctx));
+  const known = useQuery(useTurbineQuery()).isFetched;
+  const [address, setAddress] = useState<string | null>(null);
+  if (known && address === null) setAddress(addressOf(view, ctx));
 
   const select = (blade: number | null) => update({ blade: blade === null ? undefined : String(blade) });
   useSceneMessages(frame, (message) => {
@@ -125,7 +127,7 @@ function SceneView() {
     <>
       <div className={`${classes.body} bench`} data-link={link} data-theme={view.theme}>
         {link === Link.Loading && <div className={classes.wait}>{t("page.scene.loading")}</div>}
-        {ready && looked && (
+        {ready && looked && address !== null && (
           <iframe
             key={attempt}
             ref={frame}
