@@ -51,6 +51,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     write.add_argument("value", help="49.5, '49,5 °C', 0x1F, raw:495 or the name of an enumeration")
     write.add_argument("--factory", action="store_true", help="allow r(w) objects")
     write.add_argument("--motion", action="store_true", help="allow objects that can set an axis in motion (6040h)")
+    write.add_argument("--address-change", action="store_true", help="allow objects that decide the network address")
     write.add_argument("--communication", action="store_true", help="allow PDO parameters, save and load commands")
     write.add_argument("--save", action="store_true", help="then save to non-volatile memory")
     saving = command("save", _save, "save the parameters of a device to its non-volatile memory")
@@ -224,6 +225,7 @@ async def _write(arguments: argparse.Namespace, output: Output) -> int:
 def _allowed(arguments: argparse.Namespace) -> Allow:
     allow = Allow.FACTORY if arguments.factory else Allow.NOTHING
     allow |= Allow.MOTION if arguments.motion else Allow.NOTHING
+    allow |= Allow.ADDRESS if arguments.address_change else Allow.NOTHING
     return allow | (Allow.COMMUNICATION if arguments.communication else Allow.NOTHING)
 
 

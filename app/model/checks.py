@@ -6,10 +6,18 @@ from decimal import Decimal
 from enum import Flag, auto
 from typing import Final
 
-from app.errors import AccessError, CommunicationError, LimitError, MotionError, PreconditionError, ValueTypeError
+from app.errors import (
+    AccessError,
+    AddressChangeError,
+    CommunicationError,
+    LimitError,
+    MotionError,
+    PreconditionError,
+    ValueTypeError,
+)
 from app.model.address import Addressing
 from app.model.datatypes import Raw, encode_raw
-from app.model.description import Access, Description, Entry, Limit, LimitRef, Lookup
+from app.model.description import Access, Description, Entry, Limit, LimitRef, Lookup, RestoreClass
 from app.model.values import quantity_of, show
 
 STORE_PARAMETERS: Final = 0x1010
@@ -26,6 +34,8 @@ class Allow(Flag):
     """Write objects that can set an axis in motion."""
     COMMUNICATION = auto()
     """Change PDOs (14xxh to 1Axxh), or write save and load commands as if they were values."""
+    ADDRESS = auto()
+    """Change at which address the device is found: a person has confirmed that the connection will be lost."""
 
 
 def check_read(entry: Entry) -> None:
@@ -46,8 +56,8 @@ def check_write(
     """Check everything that can be known before a write; gives the bytes to send.
 
     ``lookup`` knows other objects of the device; a limit that rests on an unknown object is left to the device.
-    ``allow`` says what is permitted beyond ordinary parameters. Raises AccessError, MotionError, ValueTypeError,
-    LimitError or PreconditionError.
+    ``allow`` says what is permitted beyond ordinary parameters. Raises AccessError, MotionError, CommunicationError,
+    AddressChangeError, ValueTypeError, LimitError or PreconditionError.
     """
     if not (entry.access.writable or (Allow.FACTORY in allow and entry.access is Access.FACTORY)):
         raise AccessError(address=entry.address.short, name=entry.title, access=entry.access.value)
@@ -55,6 +65,8 @@ def check_write(
         raise MotionError(address=entry.address.short, name=entry.title)
     if _is_communication(description, entry) and Allow.COMMUNICATION not in allow:
         raise CommunicationError(address=entry.address.short, name=entry.title)
+    if entry.restore is RestoreClass.NETWORK and Allow.ADDRESS not in allow:
+        raise AddressChangeError(address=entry.address.short, name=entry.title, connected="–")
     data = _encode(entry, raw)
     if isinstance(raw, int | float):
         _check_limits(entry, raw, lookup, variant)

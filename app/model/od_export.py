@@ -23,6 +23,7 @@ from app.model.description import (
     Quantity,
     QuantityRule,
     SaveCommand,
+    Variant,
     VariantValues,
 )
 from app.model.texts import load_texts
@@ -120,6 +121,7 @@ def description_dict(description: Description) -> dict[str, Any]:
         },
         "variants": list(description.variants),
         "variant_names": {one.id: one.name for one in description.variant_details.values()},
+        "variant_matches": [_variant_match(one) for one in description.variant_details.values()],
         "sources": {source.id: source.title for source in description.sources.values()},
         "groups": [{"id": group, "text_key": f"group.{group}"} for group in description.groups],
         "bit_tables": {name: _bit_table(table) for name, table in description.bit_tables.items()},
@@ -180,6 +182,13 @@ def entry_dict(entry: Entry) -> dict[str, Any]:
         "timeout_s": entry.timeout_s,
         "hexadecimal": entry.hexadecimal,
     }
+
+
+def _variant_match(variant: Variant) -> dict[str, Any]:
+    """By what a device says of itself it is known to be this one."""
+    match = variant.match
+    named = {"id": variant.id, "name": variant.name}
+    return named | {"device_name": match.device_name, "product_code": match.product_code}
 
 
 def _bit_table(table: BitTable) -> list[dict[str, Any]]:

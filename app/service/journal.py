@@ -71,6 +71,7 @@ class Kind(Enum):
     BATTERY_TEST_BEGUN = "battery_test_begun"
     BATTERY_TEST_ENDED = "battery_test_ended"
     BATTERY_CHANGED = "battery_changed"
+    VERIFIED = "verified"
 
     @property
     def severity(self) -> Severity:
@@ -151,6 +152,7 @@ _DONE: Final = (
     Kind.SCENARIO_STOPPED,
     Kind.BATTERY_TEST_BEGUN,
     Kind.BATTERY_CHANGED,
+    Kind.VERIFIED,
 )
 
 

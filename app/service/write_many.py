@@ -29,6 +29,7 @@ from app.model.checks import Allow, check_write
 from app.model.datatypes import Raw
 from app.model.description import Verify
 from app.model.station import Place, station_slug
+from app.service.address_change import require_confirmed
 from app.service.claims import Work
 from app.service.devices import Target
 from app.service.jobs import Job, JobRow, RowState
@@ -222,6 +223,7 @@ async def _check_all(rows: Sequence[Row], allow: Allow) -> None:
 
         try:
             await target.pass_gate(change.driver, change.address)
+            require_confirmed(target, target.entry(change.address), allow)
             check_write(target.description, target.entry(change.address), change.raw, lookup, allow=allow)
         except HubsideError as error:
             row.state, row.error = RowState.REFUSED, error

@@ -34,6 +34,7 @@ REFUSED_IN_REPLAY = {
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/write"),
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/save"),
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/restart"),
+    ("POST", "/api/live/devices/{turbine}/{station}/{device}/verify"),
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/motor"),
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/pdos/preview"),
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/pdos/apply"),

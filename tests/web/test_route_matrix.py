@@ -96,6 +96,7 @@ ROUTES: Final[dict[tuple[str, str], Role]] = {
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/write"): TECHNICIAN,
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/save"): TECHNICIAN,
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/restart"): TECHNICIAN,
+    ("POST", "/api/live/devices/{turbine}/{station}/{device}/verify"): TECHNICIAN,
     ("GET", "/api/live/devices/{turbine}/{station}/{device}/changes"): VIEWER,
     ("POST", "/api/live/writes"): TECHNICIAN,
     ("POST", "/api/live/writes/plan"): TECHNICIAN,

@@ -25,7 +25,7 @@ TEXT_KEYS: Final = frozenset(
     motion_prepared motion_put_back motion_begun motion_ended motion_stopped fault_reset homed pdo_changed pdo_put_back
     pdo_rolled_back pdo_broken
     battery_test_begun battery_test_ended battery_changed
-    scope_armed scope_captured
+    scope_armed scope_captured verified
     """.split()
 )
 """The texts of events that recordings of this bench bear."""

@@ -1394,6 +1394,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/live/devices/{turbine}/{station}/{device}/verify": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Verify Device
+         * @description Read the whole dictionary of the device and hold its description against it. Writes nothing.
+         */
+        post: operations["verify_device"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/live/devices/{turbine}/{station}/{device}/write": {
         parameters: {
             query?: never;
@@ -7194,8 +7214,13 @@ export interface components {
         /**
          * NodeLine
          * @description One device as network management sees it. ``silent``: its heartbeat is overdue, so its state is unknown.
+         *
+         *     Not ``managed``: its bus has neither states nor heartbeats; then ``answered_t_ns``, the latest answer that it gave to
+         *     anybody, tells that it is there.
          */
         NodeLine: {
+            /** Answered T Ns */
+            answered_t_ns: number | null;
             /** Boots */
             boots: number;
             /** Device */
@@ -7204,6 +7229,8 @@ export interface components {
             heartbeat_period_ms: number | null;
             /** Heartbeat T Ns */
             heartbeat_t_ns: number | null;
+            /** Managed */
+            managed: boolean;
             /**
              * Nmt
              * @enum {string}
@@ -10800,6 +10827,35 @@ export interface components {
          */
         Verdict: "passed" | "failed" | "refused" | "broken_off" | "unwatched" | "lost" | "timed_out";
         /**
+         * VerifyDone
+         * @description ``objects``: how many the description has. No finding: the device is as it is described.
+         */
+        VerifyDone: {
+            /** Findings */
+            findings: components["schemas"]["VerifyFinding"][];
+            /** Objects */
+            objects: number;
+            /** T Ns */
+            t_ns: number;
+        };
+        /**
+         * VerifyFinding
+         * @description One difference. ``expected`` and ``found`` count sub-indices, bytes or bits, or are a value; null is nothing.
+         */
+        VerifyFinding: {
+            /** Address */
+            address: string;
+            /**
+             * Deviation
+             * @enum {string}
+             */
+            deviation: "missing" | "extra" | "subs" | "size" | "not_ready" | "mapping";
+            /** Expected */
+            expected: number | null;
+            /** Found */
+            found: number | null;
+        };
+        /**
          * VisitChange
          * @description What is to change; null stays as it is.
          */
@@ -10891,12 +10947,36 @@ export interface components {
         /**
          * WriteRequest
          * @description ``raw``: a number, a text, or octets as hexadecimal digits.
+         *
+         *     ``address_confirmed``: the person knows that the device will be found at another network address.
          */
         WriteRequest: {
             /** Address */
             address: string;
+            /**
+             * Address Confirmed
+             * @default false
+             */
+            address_confirmed: boolean;
             /** Raw */
             raw: number | string;
+        };
+        /**
+         * WritesAddressChange
+         * @description A device that will be found elsewhere once it was saved and restarted; its rows need a confirmation.
+         *
+         *     ``connected``: where it is reached now. ``site_address``: what the site file must name then; null where nobody can
+         *     tell beforehand (DHCP, or the bus itself is switched).
+         */
+        WritesAddressChange: {
+            /** Addresses */
+            addresses: string[];
+            /** Connected */
+            connected: string;
+            /** Device */
+            device: string;
+            /** Site Address */
+            site_address: string | null;
         };
         /**
          * WritesPlan
@@ -10906,6 +10986,8 @@ export interface components {
          *     all is written. ``unknown``: not known yet, and read before the first write, so that the order may become another.
          */
         WritesPlan: {
+            /** Address Changes */
+            address_changes: components["schemas"]["WritesAddressChange"][];
             /** Broken */
             broken: components["schemas"]["RuleFinding"][];
             /** Rows */
@@ -10942,6 +11024,8 @@ export interface components {
          * @description ``save`` names the devices whose verified values are made permanent; with "stop" nothing follows a failure.
          *
          *     ``accepted``: rules that hold after every write elsewhere may be broken on the way where they are broken in the end.
+         *     ``address_confirmed``: the person knows that the device will be found at another address (``address_changes`` of the
+         *     plan); without it what decides the address is refused.
          */
         WritesRequest: {
             /**
@@ -10949,6 +11033,11 @@ export interface components {
              * @default false
              */
             accepted: boolean;
+            /**
+             * Address Confirmed
+             * @default false
+             */
+            address_confirmed: boolean;
             /**
              * On Failure
              * @default stop
@@ -17264,6 +17353,116 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["StopDone"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Conflict */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Bad Gateway */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Service Unavailable */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Gateway Timeout */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    verify_device: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                turbine: string;
+                station: string;
+                device: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /** @example {} */
+                "application/json": components["schemas"]["Nothing"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["VerifyDone"];
                 };
             };
             /** @description Unauthorized */

@@ -25,6 +25,7 @@ export type WritesRequest = Schemas["WritesRequest"];
 export type WriteResult = Schemas["WriteDone"];
 export type SaveResult = Schemas["SaveDone"];
 export type RestartResult = Schemas["RestartDone"];
+export type VerifyResult = Schemas["VerifyDone"];
 export type StopResult = Schemas["StopDone"];
 
 export type ServerMessage = Schemas["ServerMessage"];
@@ -99,7 +100,13 @@ export interface EntryDoc extends QuantityDoc {
   verify: "equal" | "ack" | "effect";
   requires: { address: string; values: number[] }[];
   note: string | null;
+  /** The save category that keeps it, where a device saves by categories. */
+  save_category: string | null;
+  by_variant: Record<string, { default: RawDoc | null; minimum: LimitDoc | null; maximum: LimitDoc | null }>;
+  /** Its manual does not print all of it: what not is in `unproven` (nothing named: all), `origin` tells it instead. */
   inferred: boolean;
+  unproven: string[];
+  origin: string | null;
   /** A write can set an axis in motion. */
   motion: boolean;
   hexadecimal: boolean;
@@ -144,4 +151,10 @@ export interface DescriptionDoc {
   enumerations: Record<string, EnumerationDoc>;
   errors: ErrorDoc[];
   entries: EntryDoc[];
+  /** What makes RAM permanent; `category` null: all of it. */
+  save: { address: string; category: string | null }[];
+  /** Devices that share this description, and how each is known. */
+  variant_matches: { id: string; name: string; device_name: string | null; product_code: number | null }[];
+  /** Titles of what tells facts that the device's own manual does not print, by id. */
+  sources: Record<string, string>;
 }

@@ -32,7 +32,11 @@ const PLAIN: EntryDoc = {
   verify: "equal",
   requires: [],
   note: null,
+  save_category: null,
+  by_variant: {},
   inferred: false,
+  unproven: [],
+  origin: null,
   motion: false,
   also: [],
   hexadecimal: false,
@@ -54,6 +58,9 @@ const DOC: DescriptionDoc = {
   },
   errors: [],
   entries: [],
+  save: [],
+  variant_matches: [],
+  sources: {},
 };
 
 const nothing: Lookup = () => null;
