@@ -7,7 +7,8 @@ from typing import Final, Protocol
 
 from app.drivers.bitrate_search import SEARCH_LISTEN_S, search_bitrate
 from app.drivers.can_config import parse_can
-from app.model.site import Turbine
+from app.model.description import Bus
+from app.model.site import BusConfig, Turbine
 
 
 class Told(Protocol):
@@ -33,8 +34,12 @@ NOBODY: Final[Told] = _Nobody()
 
 async def with_bitrates(turbine: Turbine, listen_s: float, told: Told = NOBODY) -> Turbine:
     """``turbine`` with the rates that were found. Raises what ``search_bitrate`` raises."""
-    buses = [replace(b, connection=await with_bitrate(b.connection, listen_s, told)) for b in turbine.buses]
+    buses = [b if b.kind is Bus.MODBUS_TCP else await _with_rate(b, listen_s, told) for b in turbine.buses]
     return replace(turbine, buses=tuple(buses))
+
+
+async def _with_rate(bus: BusConfig, listen_s: float, told: Told) -> BusConfig:
+    return replace(bus, connection=await with_bitrate(bus.connection, listen_s, told))
 
 
 async def with_bitrate(connection: str, listen_s: float, told: Told = NOBODY) -> str:

@@ -13,7 +13,7 @@ from app.errors import ValueTypeError
 from app.model.address import Address
 from app.model.axis_state import AxisState
 from app.model.datatypes import DataType, Raw
-from app.model.description import Entry
+from app.model.description import Bus, Entry
 from app.model.site import Station, Turbine
 from app.model.values import to_scaled
 from app.service.devices import Target, decode
@@ -71,7 +71,11 @@ _COMPLAINTS: Final = ((STATUSWORD, 1 << 7, 1 << 3), (Address(0x3000), 1 << 1, 1 
 
 @dataclass(frozen=True, slots=True)
 class NodeLine:
-    """One device as network management sees it. ``silent``: its heartbeat is overdue, so its state is unknown."""
+    """One device as network management sees it. ``silent``: its heartbeat is overdue, so its state is unknown.
+
+    Not ``managed``: its bus has neither states nor heartbeats; then ``answered_t_ns``, the latest answer that it gave to
+    anybody, tells that it is there.
+    """
 
     device: str
     node: int
@@ -80,6 +84,8 @@ class NodeLine:
     heartbeat_t_ns: int | None
     heartbeat_period_ms: float | None
     boots: int
+    managed: bool
+    answered_t_ns: int | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,12 +174,28 @@ def node_lines(targets: Iterable[Target], live: LiveState) -> tuple[NodeLine, ..
     return tuple(_node_line(target, live.node(target.device.bus, target.node)) for target in targets)
 
 
+def is_managed(target: Target) -> bool:
+    """True where its bus has network management: states, heartbeats, boot-up messages."""
+    return target.description.bus is not Bus.MODBUS_TCP
+
+
 def _node_line(target: Target, view: NodeView | None) -> NodeLine:
+    managed = is_managed(target)
     if view is None:
-        return NodeLine(target.slug, target.node, "unknown", False, None, None, 0)
+        return NodeLine(target.slug, target.node, "unknown", False, None, None, 0, managed, None)
     nmt: NmtName = "unknown" if view.state is None or view.silent else _NMT[view.state]
     period_ms = None if view.period_ns is None else round(view.period_ns / 1e6, 1)
-    return NodeLine(target.slug, target.node, nmt, view.silent, view.heartbeat_ns, period_ms, view.boots)
+    return NodeLine(
+        device=target.slug,
+        node=target.node,
+        nmt=nmt,
+        silent=view.silent,
+        heartbeat_t_ns=view.heartbeat_ns,
+        heartbeat_period_ms=period_ms,
+        boots=view.boots,
+        managed=managed,
+        answered_t_ns=None if managed else view.answered_ns,
+    )
 
 
 def nodes_urgent(lines: Iterable[NodeLine]) -> tuple[Any, ...]:

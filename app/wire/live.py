@@ -276,6 +276,7 @@ class LiveState:
     def _on_sdo(self, seen: SdoSeen) -> None:
         node = self._node(seen.bus, seen.node)
         if seen.outcome is Outcome.DONE or seen.aborted_by is Side.SERVER:
+            node.answered_ns = seen.t_ns
             self._see(node)
         if seen.client is Direction.RX and node.seen:
             node.other_client_ns = seen.t_ns
@@ -401,6 +402,7 @@ class LiveState:
     def _on_transaction(self, seen: TransactionSeen) -> None:
         node = self._node(seen.bus, seen.node)
         if seen.outcome in (Outcome.DONE, Outcome.ABORTED):
+            node.answered_ns = seen.t_ns
             self._see(node)
         if seen.client is Direction.RX and node.seen:
             node.other_client_ns = seen.t_ns

@@ -7130,8 +7130,13 @@ export interface components {
         /**
          * NodeLine
          * @description One device as network management sees it. ``silent``: its heartbeat is overdue, so its state is unknown.
+         *
+         *     Not ``managed``: its bus has neither states nor heartbeats; then ``answered_t_ns``, the latest answer that it gave to
+         *     anybody, tells that it is there.
          */
         NodeLine: {
+            /** Answered T Ns */
+            answered_t_ns: number | null;
             /** Boots */
             boots: number;
             /** Device */
@@ -7140,6 +7145,8 @@ export interface components {
             heartbeat_period_ms: number | null;
             /** Heartbeat T Ns */
             heartbeat_t_ns: number | null;
+            /** Managed */
+            managed: boolean;
             /**
              * Nmt
              * @enum {string}

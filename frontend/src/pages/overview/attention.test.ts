@@ -51,6 +51,8 @@ const node = (ageMs: number | null): NodeData => ({
   heartbeat_t_ns: ageMs === null ? null : (NOW_MS - ageMs) * 1e6,
   heartbeat_period_ms: 500,
   boots: 1,
+  managed: true,
+  answered_t_ns: null,
 });
 const axis = (code: number, severity: "error" | "warning" = "error") =>
   ({
