@@ -44,6 +44,7 @@ REFUSED_IN_REPLAY = {
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/jog"),
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/move"),
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/home"),
+    ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/search-home"),
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/reset"),
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/hold"),
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/feather"),

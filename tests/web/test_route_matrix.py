@@ -73,6 +73,7 @@ ROUTES: Final[dict[tuple[str, str], Role]] = {
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/jog"): TECHNICIAN,
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/move"): TECHNICIAN,
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/home"): TECHNICIAN,
+    ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/search-home"): TECHNICIAN,
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/reset"): TECHNICIAN,
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/hold"): TECHNICIAN,
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/feather"): TECHNICIAN,

@@ -18,9 +18,11 @@ from typing import Final
 
 from app.drivers.contract import LinkState
 from app.errors import (
+    BusLostError,
     HubsideError,
     InterlockError,
     LeaseHeldError,
+    NoAnswerError,
     NotConnectedError,
     NotHeldError,
     NotPreparedError,
@@ -37,7 +39,7 @@ from app.service.journal import Journal, Kind
 from app.service.motion import interlocks, preparation
 from app.service.motion.control import Control, Word
 from app.service.motion.dead_man import SILENCE_S, DeadMan
-from app.service.motion.heartbeat import Heartbeat
+from app.service.motion.heartbeat import Heartbeat, NoHeartbeat
 from app.service.motion.interlocks import Confirmed, Interlock, Standing
 from app.service.motion.lease import Holder, Lease
 from app.service.motion.left import Left
@@ -48,6 +50,8 @@ UNKNOWN: Final = "–"
 log = logging.getLogger(__name__)
 
 TICK_S: Final = 0.02
+BACK_S: Final = 30.0
+"""A device that cannot be reached for so long may have another master since."""
 OBEY_S: Final = 0.25
 """An axis that is still enabled so long after a quick stop has not heard it."""
 CLOSE_S: Final = 8.0
@@ -84,6 +88,7 @@ class Ended(Enum):
     FAILED = "failed"
 
 
+_UNHEARD: Final = (BusLostError, NoAnswerError)
 _STOPPED: Final = (Ended.SILENT, Ended.LEASE, Ended.LINK, Ended.INTERLOCK)
 """A quick stop was sent already."""
 
@@ -152,8 +157,9 @@ class MotionDesk:
         self._closed = False
         self._heartbeats = {
             bus.name: Heartbeat(connection.buses[bus.name].driver, bus.heartbeat_node, now_s)
+            if connection.buses[bus.name].has_pdos
+            else NoHeartbeat(now_s)
             for bus in connection.turbine.buses
-            if bus.heartbeat_node is not None
         }
         self._reconnects: dict[str, int] = {}
         connection.gate.claims.axes = self
@@ -228,13 +234,39 @@ class MotionDesk:
         return status.state is not LinkState.CONNECTED or status.reconnects != before
 
     def _link_lost(self, bus: str) -> None:
-        """The drives on it stop by themselves, for our heartbeat does not come again; each must prove it anew."""
+        """The drives on it stop by themselves, for our heartbeat does not come again; each must prove it anew.
+
+        Where they cannot, nobody knows what they do: one that was told to run is stopped once the link is back.
+        """
         running = self.running
         if running is not None and running.control.target.device.bus == bus:
-            self._stop_running(running, Ended.LINK)
+            self._lost(running)
         for axis in self.prepared.values():
             if axis.control.target.device.bus == bus:
-                axis.proof_s = None
+                axis.void()
+
+    def _lost(self, running: Running) -> None:
+        """Nothing is heard of the axis any more."""
+        self._stop_running(running, Ended.LINK)
+        if not self._heartbeats[running.control.target.device.bus].watched:
+            if (axis := self.prepared.get(running.slug)) is not None:
+                axis.void()
+            self._journal.note(Kind.MOTION_LOST, running.slug)
+            self._chore(self._stop_once_back(running.control))
+
+    async def _stop_once_back(self, control: Control) -> None:
+        """Quick stop as soon as the device can be reached again, unless somebody else has commanded it by then."""
+        link = self.connection.buses[control.target.device.bus]
+        end_s = monotonic() + BACK_S
+        while monotonic() < end_s and not control.overtaken:
+            if link.status.state is LinkState.CONNECTED:
+                try:
+                    await control.stop_by_write()
+                except (BusLostError, NoAnswerError) as error:
+                    log.warning("%s: not stopped yet: %s", control.target.slug, error.code)
+                else:
+                    return
+            await asyncio.sleep(TICK_S)
 
     def page_gone(self, page: str) -> None:
         """The socket of a page is closed: who held by it holds nothing any more."""
@@ -269,10 +301,19 @@ class MotionDesk:
             running.end(Ended.RELEASED)
             return
         try:
-            running.control.word(running.let_go)
+            at_once = running.control.let_go(running.let_go)
             running.end(Ended.RELEASED)
+            if not at_once:
+                self._chore(self._let_go_by_write(running))
         except OvertakenError:  # STOP or FEATHER has it now
             running.end(Ended.STOPPED)
+        except HubsideError as error:
+            log.warning("%s: halt was not sent: %s", running.slug, error.code)
+            self._stop_running(running, Ended.RELEASED)
+
+    async def _let_go_by_write(self, running: Running) -> None:
+        try:
+            await running.control.let_go_by_write(running.let_go)
         except HubsideError as error:
             log.warning("%s: halt was not sent: %s", running.slug, error.code)
             self._stop_running(running, Ended.RELEASED)
@@ -288,7 +329,7 @@ class MotionDesk:
             self._heartbeats[running.control.target.device.bus].withhold(running.slug)
             by_pdo = False
         if not by_pdo:
-            self._chore(running.control.stop_by_sdo())
+            self._chore(running.control.stop_by_write())
         self._chore(self._see_off(running.control))
         self._journal.note(Kind.MOTION_STOPPED, running.slug, reason=why.value)
 
@@ -307,7 +348,7 @@ class MotionDesk:
             heartbeat.go_on(slug)
             return
         heartbeat.withhold(slug)
-        await control.stop_by_sdo()
+        await control.stop_by_write()
         if await control.until_off(preparation.OFF_TIMEOUT_S):
             heartbeat.go_on(slug)
 
@@ -373,7 +414,7 @@ class MotionDesk:
         else:
             self._journal.by(holder.person).note(Kind.LEASE_TAKEN)
         for axis in self.prepared.values():
-            axis.proof_s = None  # at once: what is being put back must not move meanwhile
+            axis.void()  # at once: what is being put back must not move meanwhile
         if self.prepared:
             self._chore(self._put_all_back())
 
@@ -388,8 +429,16 @@ class MotionDesk:
         self._order = order
 
     def confirm(self, fence: int, confirmed: Confirmed) -> None:
-        """What the holder has looked at; who takes it back stops what moves. Raises LeaseNeededError, LeaseError."""
-        self.lease.check(fence)
+        """What the holder has looked at; who takes it back stops what moves.
+
+        Raises LeaseNeededError, LeaseError, UsageError (no such stop is named).
+        """
+        journal = self._journal.by(self.lease.check(fence).person)
+        for slug in sorted(confirmed.external_stops - self.confirmed.external_stops):
+            stop = self._axis(slug).device.external_stop
+            if not stop:
+                raise UsageError(reason=f"{slug}: the site file names no external_stop")
+            journal.note(Kind.EXTERNAL_STOP, slug, stop=stop)
         self.confirmed = confirmed
         running = self.running
         if running is not None and running.held and not (confirmed.rotor_locked and confirmed.people_out):
@@ -400,7 +449,7 @@ class MotionDesk:
     async def interlocks(self, slug: str) -> list[Standing]:
         """How every interlock of an axis stands. Raises UsageError."""
         target = self._axis(slug)
-        heartbeat = self._heartbeats.get(target.device.bus)
+        heartbeat = self._heartbeats[target.device.bus]
         return await interlocks.look(self.connection, target, heartbeat, self.confirmed, self.batteries_tested)
 
     async def _watch_interlocks(self, running: Running) -> None:
@@ -428,7 +477,9 @@ class MotionDesk:
                 raise InterlockError(device=slug, **standing.reason)
 
     async def prepare(self, slug: str, fence: int) -> Prepared:
-        """Set an axis up and have it prove that it stops by itself; held all the while.
+        """Set an axis up and have it prove that it stops by itself, where its bus has what it could prove it by.
+
+        Held all the while.
 
         Raises LeaseError and its like, InterlockError, NotHeldError, and what a write raises. Where it fails, what was
         changed is put back.
@@ -442,14 +493,21 @@ class MotionDesk:
             try:
                 async with self._changing:  # the settings of an earlier lease may just be put back
                     self.prepared[slug] = axis  # another one: who puts the earlier one back finds it gone
-                    await preparation.set_up(axis, heartbeat, self.left, journal)
-                await preparation.prove(axis, heartbeat, lambda: not running.over.is_set())
-                running.held = False  # the axis has no power of ours any more
-                await preparation.after_proof(control)
+                    if heartbeat.watched:
+                        await preparation.set_up(axis, heartbeat, self.left, journal)
+                    else:
+                        await preparation.take_unwatched(axis, heartbeat, self.left)
+                if heartbeat.watched:
+                    await preparation.prove(axis, heartbeat, lambda: not running.over.is_set())
+                    running.held = False  # the axis has no power of ours any more
+                    await preparation.after_proof(control)
             except BaseException:
                 await asyncio.shield(self._put_back(axis, journal))
                 raise
-            journal.note(Kind.MOTION_PREPARED, slug, proof_ms=round(1000 * (axis.proof_s or 0.0)))
+            if axis.unwatched:
+                journal.note(Kind.MOTION_UNWATCHED, slug)
+            else:
+                journal.note(Kind.MOTION_PREPARED, slug, proof_ms=axis.proof_ms)
 
         journal = self._journal.by(self.lease.check(fence).person)
         await self._run(slug, fence, Doing.PREPARING, control, work, held=True)
@@ -481,7 +539,7 @@ class MotionDesk:
 
     async def _put_back(self, axis: Prepared, journal: Journal) -> None:
         heartbeat = self._heartbeats[axis.control.target.device.bus]
-        axis.proof_s = None  # before anything is written: it must not move any more
+        axis.void()  # before anything is written: it must not move any more
         async with self._changing:
             if self.prepared.get(axis.slug) is not axis:
                 return
@@ -569,12 +627,12 @@ class MotionDesk:
         """Let ``work`` command a prepared axis. Raises what ``_run`` raises, NotPreparedError."""
         axis = self.prepared.get(slug)
         self.lease.check(fence)
-        if axis is None or axis.proof_s is None:
+        if axis is None or not axis.may_move:
             raise NotPreparedError(device=slug)
 
         async def checked(running: Running) -> None:
             await preparation.check(axis)
-            if axis.proof_s is None or self.prepared.get(slug) is not axis:
+            if not axis.may_move or self.prepared.get(slug) is not axis:
                 raise NotPreparedError(device=slug)
             await work(running)
 
@@ -619,7 +677,10 @@ class MotionDesk:
         except BaseException as failed:  # whatever it is: nobody looks after the axis any more
             error = failed if isinstance(failed, HubsideError) else None
             if running.why not in _STOPPED:
-                self._stop_running(running, Ended.FAILED)
+                if isinstance(failed, _UNHEARD) and not self._heartbeats[control.target.device.bus].watched:
+                    self._lost(running)  # a connection whose end nobody tells looks like this
+                else:
+                    self._stop_running(running, Ended.FAILED)
             running.end(Ended.FAILED)
             raise
         finally:
@@ -665,7 +726,7 @@ class MotionDesk:
         return Control(
             link.driver,
             target.past_claims(),
-            lambda data: link.send_pdo(target.node, CONTROLWORD, data),
+            (lambda data: link.send_pdo(target.node, CONTROLWORD, data)) if link.has_pdos else None,
             lambda mode: self.left.note_mode_set(target.slug, mode),
         )
 

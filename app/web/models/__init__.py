@@ -52,12 +52,13 @@ class Session(BaseModel):
 
 
 class DeviceRef(BaseModel):
-    """One device: ``slug`` is its whole path."""
+    """One device: ``slug`` is its whole path, ``axis`` tells whether it has a controlword."""
 
     slug: str
     node: int
     description_id: str
     name: str
+    axis: bool
 
 
 class StationRef(BaseModel):

@@ -985,7 +985,7 @@ export interface paths {
         put?: never;
         /**
          * Home
-         * @description Take the present position of an axis without power for an angle (homing method 35).
+         * @description Take the present position of an axis without power for another one (homing method 35).
          */
         post: operations["home"];
         delete?: never;
@@ -1025,7 +1025,7 @@ export interface paths {
         put?: never;
         /**
          * Jog
-         * @description Turn the blade as long as it is held.
+         * @description Turn the axis as long as it is held.
          */
         post: operations["jog"];
         delete?: never;
@@ -1045,7 +1045,7 @@ export interface paths {
         put?: never;
         /**
          * Move
-         * @description Move the blade to an angle as long as it is held.
+         * @description Move the axis to a position as long as it is held.
          */
         post: operations["move"];
         delete?: never;
@@ -1086,6 +1086,8 @@ export interface paths {
         /**
          * Prepare
          * @description Have the drive watch our heartbeat and prove that it stops without it. Held; its fault may feather the blades.
+         *
+         *     One whose bus has no heartbeat is only taken, where ``self_stop`` of its interlocks lets it.
          */
         post: operations["prepare"];
         delete?: never;
@@ -1168,6 +1170,26 @@ export interface paths {
          * @description Reset the fault of the axis; nothing moves by it.
          */
         post: operations["reset"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/live/devices/{turbine}/{station}/{device}/motion/search-home": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Find Home
+         * @description Home a drive that has methods to look for its home, as long as it is held.
+         */
+        post: operations["find_home"];
         delete?: never;
         options?: never;
         head?: never;
@@ -1549,7 +1571,7 @@ export interface paths {
         put?: never;
         /**
          * Confirm
-         * @description What the holder has looked at: the rotor is locked, and nobody is in the hub.
+         * @description What the holder has looked at. For the external stop of a drive an expert answers, nobody else.
          */
         post: operations["confirm"];
         delete?: never;
@@ -4932,14 +4954,20 @@ export interface components {
         };
         /**
          * ConfirmRequest
-         * @description What the holder has looked at.
+         * @description What the holder has looked at. ``external_stops``: devices whose stop by hand an expert answers for.
          * @example {
+         *       "external_stops": [],
          *       "fence": 1764029382123456,
          *       "people_out": true,
          *       "rotor_locked": true
          *     }
          */
         ConfirmRequest: {
+            /**
+             * External Stops
+             * @default []
+             */
+            external_stops: string[];
             /** Fence */
             fence: number;
             /** People Out */
@@ -5118,9 +5146,11 @@ export interface components {
         };
         /**
          * DeviceRef
-         * @description One device: ``slug`` is its whole path.
+         * @description One device: ``slug`` is its whole path, ``axis`` tells whether it has a controlword.
          */
         DeviceRef: {
+            /** Axis */
+            axis: boolean;
             /** Description Id */
             description_id: string;
             /** Name */
@@ -5893,20 +5923,30 @@ export interface components {
         };
         /**
          * HomeRequest
-         * @description Take the present position for this angle.
+         * @description Take the present position for this one.
          * @example {
-         *       "angle_deg": 90,
          *       "fence": 1764029382123456,
-         *       "order": 4
+         *       "order": 4,
+         *       "position": 90
          *     }
          */
         HomeRequest: {
-            /** Angle Deg */
-            angle_deg: number;
             /** Fence */
             fence: number;
             /** Order */
             order: number;
+            /** Position */
+            position: number;
+        };
+        /**
+         * HomedDoc
+         * @description Where the axis stands after homing, in the unit of 6064h.
+         */
+        HomedDoc: {
+            /** Position */
+            position: number;
+            /** Why */
+            why: string;
         };
         /**
          * IdentifiedDoc
@@ -6275,11 +6315,11 @@ export interface components {
         JobState: "running" | "done" | "failed" | "cancelled";
         /**
          * JogRequest
-         * @description Turn the blade at a speed while it is held; negative: towards 0 degrees.
+         * @description Turn the axis at a speed while it is held; at a blade negative is towards 0 degrees.
          * @example {
          *       "fence": 1764029382123456,
          *       "order": 2,
-         *       "speed_dps": -2
+         *       "speed": -2
          *     }
          */
         JogRequest: {
@@ -6287,8 +6327,8 @@ export interface components {
             fence: number;
             /** Order */
             order: number;
-            /** Speed Dps */
-            speed_dps: number;
+            /** Speed */
+            speed: number;
         };
         /**
          * KeptDevice
@@ -6781,13 +6821,16 @@ export interface components {
          * MotionLine
          * @description ``available`` False: nothing is connected that could move, or this is a recording.
          *
-         *     ``refused``: the page whose wish for the lease was refused last. ``left``: devices where settings still stand that
-         *     were changed for motion, by a server that was killed or a bus that was lost.
+         *     ``refused``: the page whose wish for the lease was refused last. ``external_stops``: devices whose stop by hand an
+         *     expert answers for. ``left``: devices where settings still stand that were changed for motion, by a server that was
+         *     killed or a bus that was lost.
          */
         MotionLine: {
             /** Available */
             available: boolean;
             ended: components["schemas"]["EndedLine"] | null;
+            /** External Stops */
+            external_stops: string[];
             holder: components["schemas"]["LeaseLine"] | null;
             /** Left */
             left: string[];
@@ -7019,23 +7062,23 @@ export interface components {
         };
         /**
          * MoveRequest
-         * @description Move the blade to an angle while it is held.
+         * @description Move the axis to a position while it is held.
          * @example {
-         *       "angle_deg": 45,
          *       "fence": 1764029382123456,
          *       "order": 3,
-         *       "speed_dps": 2
+         *       "position": 45,
+         *       "speed": 2
          *     }
          */
         MoveRequest: {
-            /** Angle Deg */
-            angle_deg: number;
             /** Fence */
             fence: number;
             /** Order */
             order: number;
-            /** Speed Dps */
-            speed_dps: number;
+            /** Position */
+            position: number;
+            /** Speed */
+            speed: number;
         };
         /**
          * MovedDoc
@@ -7215,8 +7258,8 @@ export interface components {
          * NodeLine
          * @description One device as network management sees it. ``silent``: its heartbeat is overdue, so its state is unknown.
          *
-         *     Not ``managed``: its bus has neither states nor heartbeats; then ``answered_t_ns``, the latest answer that it gave to
-         *     anybody, tells that it is there.
+         *     Not ``managed``: its bus has neither states nor heartbeats; then ``answered_t_ns``, the latest answer that it gave
+         *     to anybody, tells that it is there.
          */
         NodeLine: {
             /** Answered T Ns */
@@ -8086,21 +8129,21 @@ export interface components {
         };
         /**
          * PreparedDoc
-         * @description The proof: so long after our last heartbeat the axis had stopped by itself.
+         * @description The proof: so long after our last heartbeat the axis had stopped by itself; null where its bus has none.
          */
         PreparedDoc: {
             /** Proof Ms */
-            proof_ms: number;
+            proof_ms: number | null;
         };
         /**
          * PreparedLine
-         * @description An axis that may move: so long after our last heartbeat it had stopped by itself.
+         * @description An axis that may move: so long after our last heartbeat it had stopped by itself; None where it does not.
          */
         PreparedLine: {
             /** Device */
             device: string;
             /** Proof Ms */
-            proof_ms: number;
+            proof_ms: number | null;
         };
         /**
          * PresentVisit
@@ -9303,6 +9346,23 @@ export interface components {
             tried: components["schemas"]["RateTriedDoc"][];
             /** Trying */
             trying: number | null;
+        };
+        /**
+         * SearchHomeRequest
+         * @description Home by a method of 6098h while it is held.
+         * @example {
+         *       "fence": 1764029382123456,
+         *       "method": 17,
+         *       "order": 5
+         *     }
+         */
+        SearchHomeRequest: {
+            /** Fence */
+            fence: number;
+            /** Method */
+            method: number;
+            /** Order */
+            order: number;
         };
         /**
          * SearchRequest
@@ -15121,9 +15181,9 @@ export interface operations {
             content: {
                 /**
                  * @example {
-                 *       "angle_deg": 90,
                  *       "fence": 1764029382123456,
-                 *       "order": 4
+                 *       "order": 4,
+                 *       "position": 90
                  *     }
                  */
                 "application/json": components["schemas"]["HomeRequest"];
@@ -15335,7 +15395,7 @@ export interface operations {
                  * @example {
                  *       "fence": 1764029382123456,
                  *       "order": 2,
-                 *       "speed_dps": -2
+                 *       "speed": -2
                  *     }
                  */
                 "application/json": components["schemas"]["JogRequest"];
@@ -15449,10 +15509,10 @@ export interface operations {
             content: {
                 /**
                  * @example {
-                 *       "angle_deg": 45,
                  *       "fence": 1764029382123456,
                  *       "order": 3,
-                 *       "speed_dps": 2
+                 *       "position": 45,
+                 *       "speed": 2
                  *     }
                  */
                 "application/json": components["schemas"]["MoveRequest"];
@@ -16099,6 +16159,122 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["MovedDoc"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Conflict */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Bad Gateway */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Service Unavailable */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Gateway Timeout */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    find_home: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                turbine: string;
+                station: string;
+                device: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "fence": 1764029382123456,
+                 *       "method": 17,
+                 *       "order": 5
+                 *     }
+                 */
+                "application/json": components["schemas"]["SearchHomeRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HomedDoc"];
                 };
             };
             /** @description Unauthorized */
@@ -18046,6 +18222,7 @@ export interface operations {
             content: {
                 /**
                  * @example {
+                 *       "external_stops": [],
                  *       "fence": 1764029382123456,
                  *       "people_out": true,
                  *       "rotor_locked": true

@@ -238,7 +238,7 @@ async def _start(stage: Stage) -> None:
     assert answer.status_code == 200, answer.text
     await page.hold(False)
     await page.hold(True)
-    stage.motion = asyncio.create_task(page.post(f"{URL}/jog", fence=page.fence, speed_dps=SPEED_DPS))
+    stage.motion = asyncio.create_task(page.post(f"{URL}/jog", fence=page.fence, speed=SPEED_DPS))
     pmc = stage.served.turbine.blades[0].pmc
     await _until(lambda: pmc.drive.velocity < 0.95 * SPEED_DPS * 100)
     stage.full = abs(pmc.drive.plant.speed_rad_s)
@@ -347,16 +347,16 @@ async def test_a_second_page_and_old_orders_do_nothing(served: Served, tmp_path:
         answer = await other.post("/api/live/motion/lease", page="other")
         assert (answer.status_code, answer.json()["code"]) == (409, "lease_held")
         for fence, order, code in ((held.fence - 1, 99, "lease"), (held.fence, held.order, "old_order")):
-            answer = await other.post(f"{URL}/jog", fence=fence, order=order, speed_dps=4.0)
+            answer = await other.post(f"{URL}/jog", fence=fence, order=order, speed=4.0)
             assert (answer.status_code, answer.json()["code"]) == (409, code)
         assert stage.speed > 0.9, "who holds it is not disturbed"
         await held.freeze()
         other.fence, other.number = held.fence, 10_000
         await other.hold(True)  # the number of the lease alone holds nothing: another page has it
         await stopped(stage, "browser frozen, another page beats")
-        answer = await held.post(f"{URL}/jog", fence=held.fence, order=held.order, speed_dps=SPEED_DPS)
+        answer = await held.post(f"{URL}/jog", fence=held.fence, order=held.order, speed=SPEED_DPS)
         assert answer.json()["code"] == "old_order"
-        answer = await held.post(f"{URL}/jog", fence=held.fence, speed_dps=SPEED_DPS)
+        answer = await held.post(f"{URL}/jog", fence=held.fence, speed=SPEED_DPS)
         assert answer.json()["code"] == "not_held"
         await asyncio.sleep(0.3)
         assert stage.speed < NO_MORE
@@ -368,7 +368,7 @@ async def test_nothing_moves_without_a_lease(served: Served, tmp_path: Path) -> 
         answer = await page.post("/api/live/motion/lease/give-back", fence=page.fence)
         assert answer.status_code == 200
         await stopped(stage, "lease given back")
-        answer = await page.post(f"{URL}/jog", fence=page.fence, speed_dps=SPEED_DPS)
+        answer = await page.post(f"{URL}/jog", fence=page.fence, speed=SPEED_DPS)
         assert (answer.status_code, answer.json()["code"]) == (409, "lease_needed")
         await asyncio.sleep(0.3)
         assert stage.speed < NO_MORE
