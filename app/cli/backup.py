@@ -108,9 +108,9 @@ def _tell_plates(output: Output, sets: Iterable[ParameterSet], plated: set[str])
     """Devices that nothing identifies, and plates that were typed although the device tells its number."""
     for one in sets:
         slug, identity = one.origin.device, one.identity
-        if identity.serial and slug in plated:
-            output.say("cli.backup.plate_needless", device=slug, serial=identity.serial)
-    nameless = [one.origin.device for one in sets if not one.identity.serial and one.identity.nameplate is None]
+        if identity.mark is not None and slug in plated:
+            output.say("cli.backup.plate_needless", device=slug, serial=identity.mark)
+    nameless = [one.origin.device for one in sets if one.identity.mark is None and one.identity.nameplate is None]
     if nameless:
         output.say("cli.backup.no_serial", devices=", ".join(nameless), first=nameless[0])
 
@@ -166,6 +166,7 @@ def _details(target: Target, path: Path, report: ReadReport, found: ParameterSet
         "unread": len(report.errors),
         "hash": found.hash,
         "serial": found.identity.serial,
+        "drive_serial": found.identity.drive_serial,
         "nameplate": found.identity.nameplate,
         "work_order": found.origin.work_order,
     }

@@ -22,6 +22,7 @@ from app.model.address import Address, parse_address
 from app.model.checks import Allow, check_read
 from app.model.datatypes import Raw
 from app.model.description import Entry
+from app.model.saving import Category, has_categories, saves_for, text_key
 from app.model.texts import error_text
 from app.model.values import show, to_scaled
 from app.service.backup import ReadReport, read_device, readable
@@ -56,7 +57,8 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     write.add_argument("--save", action="store_true", help="then save to non-volatile memory")
     saving = command("save", _save, "save the parameters of a device to its non-volatile memory")
     saving.add_argument("target", help="TURBINE/STATION/DEVICE or a node number")
-    restarting = command("restart", _restart, "restart a device")
+    saving.add_argument("--category", help="save only this category, where the device has some; all else")
+    restarting = command("restart", _restart, "restart a device, and prove what it has saved where it tells that")
     restarting.add_argument("target", help="TURBINE/STATION/DEVICE or a node number")
     record = command("record", _record, "record all frames to MCAP until interrupted")
     record.add_argument("--seconds", type=seconds, help="end by itself after so long")
@@ -218,7 +220,8 @@ async def _write(arguments: argparse.Namespace, output: Output) -> int:
                 raise
             _tell_written(target, entry, result, output)
             if arguments.save and result.verified:
-                await _save_one(connection, target, output)
+                for category in saves_for(target.description, (address,)) or (None,):
+                    await _save_one(connection, target, output, category)
     return 0 if result.verified else UnverifiedError.exit_code
 
 
@@ -245,14 +248,19 @@ async def _save(arguments: argparse.Namespace, output: Output) -> int:
     async with connected(arguments, output) as connection:
         target = target_of(connection, arguments.target)
         async with audited(arguments, output, connection):
-            await _save_one(connection, target, output)
+            await _save_one(connection, target, output, arguments.category)
     return 0
 
 
-async def _save_one(connection: Connection, target: Target, output: Output) -> None:
-    took = await save(connection.driver(target), target, connection.journal, connection.stamper)
-    text = output.texts("cli.save_done", device=target.slug, took_s=f"{took.took_s:.2f}")
-    output.result({"device": target.slug, "saved": True, "took_s": took.took_s}, text)
+async def _save_one(connection: Connection, target: Target, output: Output, category: Category) -> None:
+    took = await save(connection.driver(target), target, connection.journal, connection.stamper, category)
+    known = {"device": target.slug, "saved": True, "took_s": took.took_s}
+    shown = {"device": target.slug, "took_s": f"{took.took_s:.2f}"}
+    if has_categories(target.description):
+        text = output.texts("cli.save_part_done", category=output.texts(text_key(category)), **shown)
+        output.result({**known, "category": category, "proven": False}, text)
+    else:
+        output.result(known, output.texts("cli.save_done", **shown))
 
 
 async def _restart(arguments: argparse.Namespace, output: Output) -> int:
@@ -261,7 +269,11 @@ async def _restart(arguments: argparse.Namespace, output: Output) -> int:
         async with audited(arguments, output, connection):
             took = await restart(connection.driver(target), target, connection.journal, connection.stamper)
         text = output.texts("cli.restart_done", device=target.slug, took_s=f"{took.took_s:.2f}")
-        output.result({"device": target.slug, "took_s": took.took_s}, text)
+        known: dict[str, Any] = {"device": target.slug, "took_s": took.took_s}
+        if took.proven is not None:
+            known["proven"] = took.proven
+            text = f"{text}\n{output.texts('cli.save_proven' if took.proven else 'cli.save_not_proven')}"
+        output.result(known, text)
     return 0
 
 

@@ -72,6 +72,9 @@ def add_terms(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--record-file", type=Path, metavar="FILE", help="write the sealed record there: .html, .pdf or .json"
     )
+    parser.add_argument(
+        "--network", action="store_true", help="the network address goes along too; the device is elsewhere then"
+    )
     parser.add_argument("--expert", action="store_true", help="also restore what only the maker sets")
     parser.add_argument(
         "--other-blades-confirmed", action="store_true", help="with --expert: the other blades need not be in feather"
@@ -198,6 +201,7 @@ async def _order(arguments: argparse.Namespace, connection: Connection, office: 
         selected=_selected(arguments.select, station, given),
         restart=arguments.restart,
         expert=arguments.expert,
+        network=arguments.network,
         reason=arguments.reason,
         work_order=arguments.work_order,
         confirm_s=None if arguments.yes else arguments.confirm_within,

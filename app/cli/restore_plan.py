@@ -7,7 +7,8 @@ from typing import Any
 
 from app.cli.output import Output
 from app.model.datatypes import Raw
-from app.model.restore.plan import PlanRow, StepKind, Treatment
+from app.model.restore.plan import PlanRow, Step, StepKind, Treatment
+from app.model.saving import text_key
 from app.model.values import quantity_of, show
 from app.service.restore.details import plain
 from app.service.restore.prepare import Prepared
@@ -17,8 +18,9 @@ def tell_plan(prepared: Prepared, output: Output) -> None:
     """For people: rows that are written, how many others are not and why, and every reason against it."""
     plan = prepared.plan
     writes = [row for row in plan.rows if row.treatment is Treatment.WRITE]
-    head = ("DEVICE", "ADDRESS", "NAME", "NOW", "WANTED", "UNIT")
-    output.table(head, [_row(prepared, row, output) for row in writes])
+    parts = any(step.category is not None for step in plan.steps)
+    head = ("DEVICE", "ADDRESS", "NAME", "NOW", "WANTED", "UNIT", *(("CATEGORY",) if parts else ()))
+    output.table(head, [(*_row(prepared, row, output), *_part(prepared, row, output, parts)) for row in writes])
     counts = Counter(row.why for row in plan.rows if row.why is not None and row.wanted is not None)
     output.say(
         "cli.restore_plan",
@@ -29,9 +31,11 @@ def tell_plan(prepared: Prepared, output: Output) -> None:
     )
     for why, count in counts.items():
         output.say("cli.restore_skipped", count=count, why_key=f"restore.why.{why.value}")
-    saves = [step.device for step in plan.steps if step.kind is StepKind.SAVE]
+    saves = [_save(step, output) for step in plan.steps if step.kind is StepKind.SAVE]
     restarts = [step.device for step in plan.steps if step.kind is StepKind.RESTART]
     output.say("cli.restore_then", saves=", ".join(saves) or "–", restarts=", ".join(restarts) or "–")
+    if plan.new_address:
+        output.say("cli.restore_new_address", addresses=", ".join(place.address.short for place in plan.new_address))
     for refusal in prepared.refusals:
         text = output.texts(refusal.objection.text_key, **refusal.details)
         output.say("cli.restore_refusal", device=refusal.device or prepared.order.station, text=text)
@@ -55,11 +59,30 @@ def plan_dict(prepared: Prepared) -> dict[str, Any]:
             for row in rows
         ],
         "steps": [
-            {"kind": step.kind.value, "device": step.device, "address": step.place and step.place.address.short}
+            {
+                "kind": step.kind.value,
+                "device": step.device,
+                "address": step.place and step.place.address.short,
+                **({} if step.category is None else {"category": step.category}),
+            }
             for step in prepared.plan.steps
         ],
         "refusals": [refusal.as_detail() for refusal in prepared.refusals],
     }
+
+
+def _save(step: Step, output: Output) -> str:
+    """What is saved, as ``turbine/station/device (Tuning)``."""
+    return step.device if step.category is None else f"{step.device} ({output.texts(text_key(step.category))})"
+
+
+def _part(prepared: Prepared, row: PlanRow, output: Output, wanted: bool) -> tuple[str, ...]:
+    """The category that saves the object, where there are some."""
+    device = prepared.found.station.device(row.place.slug)
+    if not wanted or device is None:
+        return ()
+    category = device.description.entry(row.place.address).save_category
+    return ("–" if category is None else output.texts(text_key(category)),)
 
 
 def _row(prepared: Prepared, row: PlanRow, output: Output) -> tuple[str, ...]:

@@ -30,7 +30,8 @@ from app.drivers.sdo_jobs import Counters, Steps, read_steps, write_steps
 from app.drivers.urgent import UrgentCommands
 from app.errors import BusLostError, ConsentError, HubsideError, NoAnswerError, RefusedError, UsageError
 from app.model.address import Address
-from app.model.description import Description, Verify
+from app.model.description import Description, SaveCommand, Verify
+from app.model.saving import command_of
 from app.wire import nmt
 from app.wire.frame import Can, Direction, Frame, Stamper
 
@@ -56,6 +57,8 @@ class CanOpenDriver:
     request, ``consent`` allows active access beside another master.
     """
 
+    ends_when_silent: Final = False
+
     def __init__(
         self,
         config: CanConfig,
@@ -77,6 +80,7 @@ class CanOpenDriver:
         self._masters_before: tuple[MasterSign, ...] = ()
         self._pending: set[asyncio.Future[Any]] = set()
         self._timeouts_ns: dict[int, dict[Address, int]] = {}
+        self._saves: dict[int, tuple[SaveCommand, ...]] = {}
         self._port = CanPort(config.listening(True), bus, stamper, self.watch.on_frames, monotonic_ns=monotonic_ns)
         self._port.gather_s = GATHER_S
         self._commands = UrgentCommands()
@@ -183,8 +187,9 @@ class CanOpenDriver:
         return lambda: self._port.remove_listener(callback)
 
     def set_description(self, node: int, description: Description) -> None:
-        """Take the time-outs of the objects of ``node`` from its description."""
-        self._timeouts_ns[_checked(node)] = {
+        """Take the time-outs of the objects of ``node``, and how it saves, from its description."""
+        self._saves[_checked(node)] = description.save
+        self._timeouts_ns[node] = {
             entry.address: int(entry.timeout_s * 1e9) for entry in description if entry.timeout_s is not None
         }
 
@@ -291,6 +296,15 @@ class CanOpenDriver:
         """Send one heartbeat as ``node``, operational (CiA 301, 7.2.8.3.2.2). Raises ConsentError, BusLostError."""
         self._require_active(node)
         self._port.send(Can(_HEARTBEAT_BASE + node, nmt.heartbeat(nmt.NmtState.OPERATIONAL)))
+
+    async def save(self, node: int, category: str | None = None) -> None:
+        """See Driver. A device of CANopen keeps no date of it."""
+        command = command_of(self._saves.get(_checked(node), ()), category)
+        await self.write(node, command.address, command.signature.to_bytes(4, "little"), command.timeout_s, Verify.ACK)
+
+    async def bears(self, node: int, stamp: tuple[int, int]) -> bool:
+        """See Driver."""
+        return False
 
     async def restart(self, node: int, timeout_s: float = 10.0) -> None:
         """NMT reset node, then wait for its boot-up message. Raises NoAnswerError, ConsentError, BusLostError."""

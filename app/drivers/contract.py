@@ -114,6 +114,10 @@ class Driver(Protocol):
 
     bus: str
 
+    @property
+    def ends_when_silent(self) -> bool:
+        """Whether ``read_many`` asks no further where a device has fallen silent."""
+
     async def connect(self, timeout_s: float = 5.0) -> None:
         """Open the bus and listen before anything is sent. Raises BusOpenError."""
 
@@ -153,6 +157,16 @@ class Driver(Protocol):
 
     def commanded(self, node: int, address: Address) -> int:
         """How many urgent commands went to the object so far."""
+
+    async def save(self, node: int, category: str | None = None) -> tuple[int, int] | None:
+        """Make the values of ``category`` (None: all) non-volatile by the device's own command, and wait for its end.
+
+        Gives the date and time that the save bears, where the device keeps them (``bears``). Raises UsageError (it has
+        no such command), UnverifiedError, and what reads and writes raise; a driver may refuse (PreconditionError).
+        """
+
+    async def bears(self, node: int, stamp: tuple[int, int]) -> bool:
+        """Whether the device holds the stamp of a save: after a restart, whether that save is in force."""
 
     async def restart(self, node: int, timeout_s: float = 10.0) -> None:
         """Restart the device and wait until it says that it is back. Raises NoAnswerError."""

@@ -10,7 +10,7 @@ import asyncio
 import logging
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import nullcontext, suppress
+from contextlib import nullcontext
 from datetime import UTC, datetime
 from typing import Final
 
@@ -33,6 +33,7 @@ from app.drivers.modbus_verify import Finding, compare
 from app.drivers.scan import match
 from app.drivers.urgent import UrgentCommands
 from app.errors import (
+    BusLostError,
     BusOpenError,
     DeviceError,
     HubsideError,
@@ -66,6 +67,8 @@ def _now() -> datetime:
 
 class ModbusDriver:
     """The devices of ``config`` as the bus ``bus``. ``stamper`` gives frames their times, ``now`` stamps saves."""
+
+    ends_when_silent: Final = True
 
     def __init__(
         self, config: ModbusConfig, stamper: Stamper, bus: str = "modbus0",
@@ -138,6 +141,11 @@ class ModbusDriver:
         """Take sizes, time-outs and names of the objects of ``node`` from its description."""
         self._device(node).description = description
 
+    def on_lost(self, callback: Callable[[], None]) -> None:
+        """Have ``callback`` called at once when a connection ends otherwise than by ``close``."""
+        for device in self._devices.values():
+            device.on_lost = callback
+
     @property
     def servers(self) -> Mapping[str, int]:
         """The nodes by ``host:port``, as the passive decoder wants them."""
@@ -180,9 +188,10 @@ class ModbusDriver:
         return {address: results[address] for address in wanted}
 
     async def _from_dictionary(self, device: ModbusDevice, wanted: tuple[Address, ...]) -> dict[Address, bytes]:
-        """What FC 101 gives of ``wanted``; nothing where the device does not have it, which is remembered.
+        """What FC 101 gives of ``wanted``; nothing where it fails, and where it always would that is remembered.
 
-        What no rule allows ends the connection: then its return is awaited.
+        The device may end the connection because of it, or we do because of what no rule allows: its return is awaited
+        then. Raises BusLostError where it does not come back.
         """
         if not device.has_dictionary:
             return {}
@@ -190,15 +199,30 @@ class ModbusDriver:
             found = await read_dictionary(device)
         except (DeviceError, ProtocolError) as error:
             _LOG.info("FC 101 failed, objects are read one by one: %s", error)
-            device.has_dictionary = not _has_no_such_function(error)
+            device.has_dictionary = not _has_no_such_function(error) and "ended_early" not in error.details
             if device.state is LinkState.LOST:
-                device.has_dictionary = False
-                with suppress(TimeoutError):
-                    await device.wait_for(LinkState.CONNECTED, _RETURN_S)
+                await self._back_after(device, error)
+            return {}
+        except BusLostError as error:
+            if device.state is LinkState.CLOSED:
+                raise
+            await self._back_after(device, error)
             return {}
         except NoAnswerError:
             return {}
         return {address: found[address] for address in wanted if address in found}
+
+    async def _back_after(self, device: ModbusDevice, error: HubsideError) -> None:
+        """FC 101 has cost the connection: wait for its return, and do not ask so again.
+
+        Raises BusLostError, with what ended the connection, where it does not come back in time.
+        """
+        device.has_dictionary = False
+        try:
+            await device.wait_for(LinkState.CONNECTED, _RETURN_S)
+        except TimeoutError:
+            reason = f"lost while the dictionary was read (FC 101): {error.details['reason']}"
+            raise BusLostError(bus=self.bus, node=device.peer.node, reason=reason) from error
 
     async def write(
         self,
@@ -238,7 +262,7 @@ class ModbusDriver:
         """Save ``category``, or all, at standstill; see ``modbus_save``."""
         return await modbus_save.save(self._device(node), category, self._now)
 
-    async def bears(self, node: int, stamp: Stamp) -> bool:
+    async def bears(self, node: int, stamp: tuple[int, int]) -> bool:
         """Whether 1020h holds ``stamp``: after a restart, whether that save is in force."""
         return await modbus_save.bears(self._device(node), stamp)
 

@@ -63,6 +63,8 @@ class ModbusDevice:
         self.description: Description | None = None
         self.has_dictionary = True
         """Whether FC 101 is worth asking; False since an answer showed that it is not, until the device is closed."""
+        self.on_lost: Callable[[], None] = lambda: None
+        """Called when a connection has ended otherwise than by ``close``, before there is another one."""
         self._bus = bus
         self._stamper = stamper
         self._tap = tap
@@ -136,6 +138,7 @@ class ModbusDevice:
         if link is not self._link or self.state is not LinkState.CONNECTED:
             return
         self._turn(LinkState.LOST, str(error.details["reason"]))
+        self.on_lost()
         if self._reopening is None or self._reopening.done():
             self._reopening = asyncio.get_running_loop().create_task(self._reopen())
 
@@ -236,7 +239,9 @@ class ModbusDevice:
         entry = None if self.description is None else self.description.entries.get(address)
         if self._saves and (motion or (entry is not None and entry.motion)):
             needs, found = "an ended save", f"a save by {self._saves[0].short} under way"
-            raise PreconditionError(address=address.short, name=self.name(address), needs=needs, found=found)
+            key = "saving.needs.no_save"
+            name = self.name(address)
+            raise PreconditionError(address=address.short, name=name, needs=needs, needs_key=key, found=found)
 
     async def _end_of_write(self, link: ModbusLink, attempt: Attempt, address: Address, wait_s: float) -> Answer | None:
         """The answer, None where there was none in time. Raises BusLostError where the connection has ended."""
@@ -281,7 +286,7 @@ class ModbusDevice:
             state = AxisState.of(int.from_bytes(await self.read(STATUSWORD), "little"))
         except HubsideError:
             return None
-        return None if state is None else f"axis_state.{_STATE_NAMES.get(state, state.name.lower())}"
+        return None if state is None else state_text_key(state)
 
     # -- what is known of objects ------------------------------------------------------------
 
@@ -321,3 +326,8 @@ class ModbusDevice:
             return timeout_s
         entry = None if self.description is None else self.description.entries.get(address)
         return DEFAULT_TIMEOUT_S if entry is None or entry.timeout_s is None else entry.timeout_s
+
+
+def state_text_key(state: AxisState) -> str:
+    """Key of the state's name."""
+    return f"axis_state.{_STATE_NAMES.get(state, state.name.lower())}"

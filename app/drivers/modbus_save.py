@@ -15,12 +15,13 @@ from contextlib import ExitStack
 from datetime import UTC, date, datetime, timedelta
 from typing import Final, NamedTuple
 
-from app.drivers.modbus_device import STATUSWORD, ModbusDevice
+from app.drivers.modbus_device import STATUSWORD, ModbusDevice, state_text_key
 from app.drivers.modbus_link import InterruptedRequest, ModbusLink
-from app.errors import BusLostError, DeviceError, NoAnswerError, PreconditionError, UnverifiedError, UsageError
+from app.errors import BusLostError, DeviceError, NoAnswerError, PreconditionError, UnverifiedError
 from app.model.address import Address
 from app.model.axis_state import FOLLOWING, AxisState
 from app.model.description import SaveCommand, Verify
+from app.model.saving import command_of
 
 STORE: Final = 0x1010
 VELOCITY: Final = Address(0x6044)
@@ -48,23 +49,13 @@ class Stamp(NamedTuple):
         return cls((utc.date() - _EPOCH).days, (utc - midnight) // timedelta(milliseconds=1))
 
 
-def command_of(device: ModbusDevice, category: str | None) -> SaveCommand:
-    """How the category is saved (None: all), by the description. Raises UsageError where it knows none such."""
-    commands = () if device.description is None else device.description.save
-    for command in commands:
-        if command.category == category:
-            return command
-    known = ", ".join(each.category or "all" for each in commands) or "none"
-    raise UsageError(reason=f"category '{category or 'all'}' cannot be saved (there are: {known})")
-
-
 async def save(device: ModbusDevice, category: str | None, now: Callable[[], datetime]) -> Stamp:
     """Save one category, or all; returns the stamp that it bears. Not proven before a restart.
 
     Raises PreconditionError (the axis is live or moves, or the entry is not ready: nothing was saved), UsageError,
     UnverifiedError (it was ordered, but the device does not say that it has ended), and what reads and writes raise.
     """
-    command = command_of(device, category)
+    command = command_of(() if device.description is None else device.description.save, category)
     await _standstill(device)
     await _ready(device, command)
     stamp = Stamp.of(now())
@@ -85,7 +76,7 @@ async def save(device: ModbusDevice, category: str | None, now: Callable[[], dat
     return stamp
 
 
-async def bears(device: ModbusDevice, stamp: Stamp) -> bool:
+async def bears(device: ModbusDevice, stamp: tuple[int, int]) -> bool:
     """Whether 1020h holds ``stamp``: after a restart, whether that save is what is in force."""
     days, ms = await device.read(SAVED_DATE), await device.read(SAVED_TIME)
     return stamp == (int.from_bytes(days, "little"), int.from_bytes(ms, "little"))
@@ -95,9 +86,14 @@ async def _standstill(device: ModbusDevice, held: ModbusLink | None = None) -> N
     """``held``: the connection whose turn the caller holds. Raises PreconditionError, and what reads raise."""
     state = AxisState.of(int.from_bytes(await device.read(STATUSWORD, held=held), "little"))
     if state is None or state in FOLLOWING:
-        found = "unknown" if state is None else state.name.lower()
+        known = {} if state is None else {"found_key": state_text_key(state)}
         raise PreconditionError(
-            address=STATUSWORD.short, name=device.name(STATUSWORD), needs="an output stage that is off", found=found
+            address=STATUSWORD.short,
+            name=device.name(STATUSWORD),
+            needs="an output stage that is off",
+            needs_key="saving.needs.stage_off",
+            found="unknown" if state is None else state.name.lower(),
+            **known,
         )
     for address in (VELOCITY, SPEED):
         try:
@@ -105,7 +101,13 @@ async def _standstill(device: ModbusDevice, held: ModbusLink | None = None) -> N
         except DeviceError:
             continue  # it has no such object
         if speed:
-            raise PreconditionError(address=address.short, name=device.name(address), needs="0", found=str(speed))
+            raise PreconditionError(
+                address=address.short,
+                name=device.name(address),
+                needs="0",
+                needs_key="saving.needs.standstill",
+                found=str(speed),
+            )
 
 
 async def _ready(device: ModbusDevice, command: SaveCommand) -> None:

@@ -33,7 +33,8 @@ _PARTS: Final = frozenset(
 class Identity:
     """What the device says of itself (1000h, 1008h to 100Ah, 1018h); None where it did not answer.
 
-    ``nameplate`` is the serial number on its plate, typed by a person; None where nobody did.
+    ``drive_serial`` is a serial number as text (4040h), where a device has one. ``nameplate`` is the serial number on
+    its plate, typed by a person; None where nobody did.
     """
 
     device_type: int | None = None
@@ -45,18 +46,30 @@ class Identity:
     revision: int | None = None
     serial: int | None = None
     nameplate: str | None = None
+    drive_serial: str | None = None
+
+    @property
+    def mark(self) -> int | str | None:
+        """The serial number that the device tells: 1018h, else that of the drive; 0 and an empty text are none."""
+        return self.serial or self.drive_serial or None
+
+    def has_other_serial(self, other: Identity) -> bool:
+        """True where both tell a serial number of the same kind, and they differ."""
+        pairs = ((self.serial, other.serial), (self.drive_serial, other.drive_serial))
+        return any(None not in pair and pair[0] != pair[1] for pair in pairs)
 
     def has_serial_of(self, other: Identity) -> bool:
         """The same serial number, of no other maker and product as far as both are known. 0 is none (CiA 301)."""
         makers = ((self.vendor_id, other.vendor_id), (self.product_code, other.product_code))
         known_to_differ = any(None not in pair and pair[0] != pair[1] for pair in makers)
-        return bool(self.serial) and self.serial == other.serial and not known_to_differ
+        return self.mark is not None and self.mark == other.mark and not known_to_differ
 
     def as_json(self) -> dict[str, Any]:
         """For files and hashes."""
         content = asdict(self)
-        if self.nameplate is None:
-            del content["nameplate"]
+        for name in ("nameplate", "drive_serial"):
+            if content[name] is None:
+                del content[name]
         return content
 
 
@@ -69,13 +82,14 @@ IDENTITY: Final = {
     "product_code": Address(0x1018, 2),
     "revision": Address(0x1018, 3),
     "serial": Address(0x1018, 4),
+    "drive_serial": Address(0x4040),
 }
-"""Where a CANopen device says who it is."""
+"""Where a device says who it is: CiA 301, and the serial number of a drive of Nanotec."""
 
 
 def identity_of(values: Mapping[Address, Raw], nameplate: str | None = None) -> Identity:
     """What the values of a device say of its identity; what is of another type than it should be says nothing."""
-    texts = ("device_name", "hardware", "software")
+    texts = ("device_name", "hardware", "software", "drive_serial")
     found = {name: values.get(address) for name, address in IDENTITY.items()}
     kept: dict[str, Any] = {name: raw for name, raw in found.items() if isinstance(raw, str if name in texts else int)}
     return Identity(**kept, nameplate=nameplate)
@@ -228,7 +242,7 @@ class _Reader:
     def identity(self, content: dict[str, Any]) -> Identity:
         part = self._part(content, "identity", dict)
         self._known("identity", part, Identity)
-        texts = ("device_name", "hardware", "software", "nameplate")
+        texts = ("device_name", "hardware", "software", "nameplate", "drive_serial")
         for key, value in part.items():
             kind: type = str if key in texts else int
             if value is not None and (isinstance(value, bool) or not isinstance(value, kind)):

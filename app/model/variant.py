@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from app.errors import UsageError
-from app.model.description import Description, Entry
+from app.model.description import Description, Entry, Match
 
 
 def as_variant(description: Description, variant: str) -> Description:
@@ -21,6 +21,20 @@ def as_variant(description: Description, variant: str) -> Description:
     name = description.name if detail is None else detail.name
     match = description.match if detail is None else detail.match
     return replace(description, entries=entries, name=name, match=match)
+
+
+def variant_of(description: Description, device_name: str | None, product_code: int | None) -> str | None:
+    """The only variant that a device which says so of itself can be; None where that is not clear."""
+    found = [one.id for one in description.variant_details.values() if _fits(one.match, device_name, product_code)]
+    return found[0] if len(found) == 1 else None
+
+
+def _fits(match: Match, device_name: str | None, product_code: int | None) -> bool:
+    """What the device does not say contradicts nothing, but one of both has to speak for it."""
+    by_name = None if match.device_name is None or not device_name else match.device_name in device_name
+    by_code = None if match.product_code is None or product_code is None else match.product_code == product_code
+    said = [one for one in (by_name, by_code) if one is not None]
+    return bool(said) and all(said)
 
 
 def _entry_of(entry: Entry, variant: str) -> Entry:

@@ -70,11 +70,21 @@ class BusLink(BusFeed):
         for node, description in descriptions.items():
             self.describe(node, description)
         self.driver.subscribe(self.on_frames)
+        if self.kind is Bus.MODBUS_TCP:
+            self.driver.on_lost(lambda: self.gap(stamper()))
 
     def describe(self, node: int, description: Description) -> None:
         """Tell decoder, live state and driver what stands at ``node``."""
         super().describe(node, description)
         self.driver.set_description(node, description)
+
+    def was_away(self, t_ns: int) -> None:
+        """The link was seen to be gone, or to be back.
+
+        A TCP connection tells its end at once, before there is a next one: what is read on that one stays proven.
+        """
+        if self.kind is not Bus.MODBUS_TCP:
+            self.gap(t_ns)
 
     def on_frames(self, frames: list[Frame]) -> None:
         """Record, count, decode."""

@@ -210,10 +210,10 @@ class Connection:
             if status.state is LinkState.CONNECTED and before is None:
                 self.journal.note(Kind.CONNECTED, None, bus=name, adapter=link.adapter)
             elif status.state is LinkState.LOST and (was_up or before is None):
-                link.gap(now_ns)
+                link.was_away(now_ns)
                 self.journal.note(Kind.BUS_LOST, None, bus=name, reason=status.reason)
             elif before is not None and status.reconnects > before.reconnects:
-                link.gap(now_ns)
+                link.was_away(now_ns)
                 self.journal.note(Kind.BUS_BACK, None, bus=name, gap_s=f"{(status.t_ns - before.t_ns) / 1e9:.1f}")
             for master in status.masters:
                 if (name, master.sign) not in self._masters:

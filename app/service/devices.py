@@ -16,7 +16,7 @@ from app.model.site import Device
 from app.service.gate import OPEN, Gate
 from app.wire.live import LiveState
 
-_WHO: Final = tuple(IDENTITY[name] for name in ("vendor_id", "product_code", "serial"))
+_WHO: Final = tuple(IDENTITY[name] for name in ("vendor_id", "product_code", "serial", "drive_serial"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,6 +81,12 @@ class Target:
     def entry(self, address: Address) -> Entry:
         """The entry at ``address``. Raises UnknownObjectError."""
         return self.description.entry(address)
+
+
+def who_is(target: Target) -> Identity:
+    """What the wire has shown of a device's identity."""
+    found = {address: raw for address in IDENTITY.values() if (raw := target.lookup(address)) is not None}
+    return identity_of(found)
 
 
 def decode(entry: Entry, data: bytes) -> Raw:

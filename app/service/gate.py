@@ -28,7 +28,7 @@ _OWN_NAMES: Final = ("localhost", "::1")
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where a device is reached: adapter (``adapter_of``) and node."""
+    """Where a device is reached: adapter (``adapter_of``), with the address of a device that has one, and node."""
 
     adapter: str
     node: int
@@ -60,7 +60,7 @@ class Block:
             return True
         unnamed = self.is_bare or _is_bare(station)
         return any(
-            theirs.has_serial_of(identity) if theirs.serial and identity.serial else unnamed and where == place
+            theirs.has_serial_of(identity) if theirs.mark and identity.mark else unnamed and where == place
             for where, theirs in self.devices
         )
 
@@ -77,18 +77,19 @@ class Blocks:
 
 
 class Gate:
-    """The gate of one connection. ``adapters`` by name of the bus; ``claims``: who is at work at which device."""
+    """The gate of one connection.
+
+    ``adapters``: as a site file writes them, by name of the bus; ``claims``: who is at work at which device.
+    """
 
     def __init__(self, adapters: Mapping[str, str], blocks: Blocks) -> None:
-        self._adapters = {name: adapter_of(connection) for name, connection in adapters.items()}
+        self._connections = dict(adapters)
         self.blocks = blocks
         self.claims = Claims()
 
     def past_claims(self) -> Gate:
         """A gate that only restores shut: for who has the device, or moves it."""
-        other = Gate({}, self.blocks)
-        other._adapters = self._adapters
-        return other
+        return Gate(self._connections, self.blocks)
 
     async def check(
         self, device: Device, ask: Callable[[], Awaitable[Identity]], address: Address | None = None
@@ -112,10 +113,16 @@ class Gate:
 
     def require_open(self, device: Device, identity: Identity) -> None:
         """Raises RestoreOpenError where a restore of the device is open."""
-        place = Place(self._adapters.get(device.bus, ""), device.node)
+        place = place_of(device, self._connections.get(device.bus, ""))
         for block in self.blocks.now:
             if block.holds(station_slug(device.slug), place, identity):
                 raise RestoreOpenError(station=block.station, restore=block.restore, device=device.slug)
+
+
+def place_of(device: Device, connection: str) -> Place:
+    """Where the device is reached, on a bus that is connected by ``connection``; by its address where it has one."""
+    adapter = adapter_of(connection)
+    return Place(f"{adapter}:{device.server.text}" if device.address else adapter, device.node)
 
 
 def adapter_of(connection: str) -> str:

@@ -29,6 +29,10 @@ class Kind(Enum):
     WRITTEN = "written"
     WRITE_FAILED = "write_failed"
     SAVED = "saved"
+    SAVED_PART = "saved_part"
+    SAVE_REFUSED = "save_refused"
+    SAVE_PROVEN = "save_proven"
+    SAVE_NOT_PROVEN = "save_not_proven"
     RESTART = "restart"
     STOP_SENT = "stop_sent"
     FEATHER_SENT = "feather_sent"
@@ -94,6 +98,8 @@ _ERRORS: Final = (
     Kind.BUS_LOST,
     Kind.MOTION_LOST,
     Kind.WRITE_FAILED,
+    Kind.SAVE_REFUSED,
+    Kind.SAVE_NOT_PROVEN,
     Kind.RECORDING_LOST,
     Kind.STORE_FAILED,
     Kind.RESTORE_INCOMPLETE,
@@ -152,6 +158,8 @@ _DONE: Final = (
     Kind.WRITTEN,
     Kind.WRITE_FAILED,
     Kind.SAVED,
+    Kind.SAVED_PART,
+    Kind.SAVE_REFUSED,
     Kind.RESTART,
     Kind.STOP_SENT,
     Kind.FEATHER_SENT,

@@ -28,13 +28,14 @@ from app.model.address import Address
 from app.model.checks import Allow, check_write
 from app.model.datatypes import Raw
 from app.model.description import Verify
+from app.model.saving import saves_for
 from app.model.station import Place, station_slug
 from app.service.address_change import require_confirmed
 from app.service.claims import Work
 from app.service.devices import Target
 from app.service.jobs import Job, JobRow, RowState
 from app.service.journal import Journal
-from app.service.save import save
+from app.service.save import save_each
 from app.service.whole import whole
 from app.service.write import note_written, write_raw
 from app.service.write_order import Device, KnownDevices
@@ -289,8 +290,9 @@ async def _save(rows: Sequence[Row], journal: Journal, now_ns: Callable[[], int]
     driver, target = rows[0][0].driver, rows[0][0].target
     for row in kept:
         row.state = RowState.SAVING
+    categories = saves_for(target.description, (change.address for change, row in rows if row in kept))
     try:
-        await save(driver, target, journal, now_ns)
+        await save_each(driver, target, journal, now_ns, categories)
     except HubsideError as error:
         for row in kept:
             row.state, row.error = RowState.NOT_SAVED, error

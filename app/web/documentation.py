@@ -93,6 +93,7 @@ BODIES: Final[dict[str, Any]] = {
     },
     "AnonymiseRequest": {"hide_times": True, "objects": ["2105:01"], "words": ["wtg-07"]},
     "CursorRequest": {"action": "step", "by": "event", "forward": True},
+    "SaveRequest": {"category": "tuning"},
     "ReadRequest": {"addresses": ["6064", "3110:01"]},
     "WriteRequest": {"address": "3110:01", "raw": 490},
     "WritesRequest": {

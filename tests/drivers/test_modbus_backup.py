@@ -6,17 +6,18 @@ import asyncio
 
 import pytest
 
+import app.drivers.modbus
 from app.drivers.contract import Written
 from app.drivers.modbus import BULK
 from app.drivers.modbus_backup import MAX_TIMEOUTS, read_dictionary
 from app.drivers.modbus_verify import Deviation, Finding, compare
-from app.errors import HubsideError, ModbusExceptionError, NoAnswerError, ProtocolError, SdoAbortError
+from app.errors import BusLostError, HubsideError, ModbusExceptionError, NoAnswerError, ProtocolError, SdoAbortError
 from app.model.address import Address
 from app.wire.modbus.adu import Message
 from app.wire.modbus.answers import AbortAnswer, Answer, ExceptionAnswer, FramesRead
 from app.wire.modbus.frames import ObjectFrame
 from app.wire.modbus.functions import Phase
-from app.wire.modbus.requests import ReadDictionary, ReadObject, WriteObject
+from app.wire.modbus.requests import ReadDictionary, ReadObject, WriteObject, decode_request
 from app.wire.sdo import Abort
 from tests.drivers.modbus_rig import CONTROLWORD, POSITION, SAVE_TUNING, STOP, WINDOW, Bad, small
 from tests.drivers.modbus_server import PD4E, Dictionary, reply
@@ -177,6 +178,85 @@ async def test_a_backup_makes_room_for_a_stop_and_begins_anew() -> None:
             ReadDictionary, ReadDictionary, ReadDictionary, WriteObject, ReadDictionary,
         ]  # fmt: skip
         assert kinds[4] == ReadDictionary(Phase.START)
+
+
+class EndsEarly(Bad):
+    """Says that there is no more data after ``messages`` messages of FC 101."""
+
+    def __init__(self, messages: int) -> None:
+        super().__init__()
+        self.messages = messages
+
+    async def instead(self, message: Message, request: object) -> bytes | None:
+        if not isinstance(request, ReadDictionary):
+            return None
+        given = sum(one == ReadDictionary(Phase.CONTINUE) for one in self.seen)
+        return reply(message, AbortAnswer(Abort.NO_DATA)) if given >= self.messages else None
+
+
+async def test_a_backup_that_ends_before_the_last_described_object_is_not_taken_for_the_whole() -> None:
+    early = EndsEarly(messages=2)
+    async with small(early) as (driver, _):
+        with pytest.raises(ProtocolError, match="ended early") as caught:
+            await driver.backup(1)
+        assert caught.value.details["ended_early"] is True
+
+
+async def test_what_a_sweep_that_ended_early_left_out_is_read_one_by_one() -> None:
+    early = EndsEarly(messages=2)
+    wanted = [entry.address for entry in PD4E if entry.access.readable]
+    async with small(early) as (driver, _):
+        assert await driver.read_many(1, wanted) == {address: early.dictionary.objects[address] for address in wanted}
+        sweeps = early.count(ReadDictionary)
+        await driver.read_many(1, wanted)
+        assert early.count(ReadDictionary) == sweeps  # it is remembered
+
+
+async def test_a_backup_may_end_before_objects_that_the_device_does_not_have() -> None:
+    dictionary = Dictionary()
+    for address in [one for one in dictionary.objects if one.major > 0x6000]:
+        del dictionary.objects[address]
+    async with small(Bad(dictionary)) as (driver, _):
+        assert await driver.backup(1) == dictionary.objects
+
+
+class HangsUp(Bad):
+    """Ends the connection where it is asked by FC 101, and gives nobody another one where ``for_good``."""
+
+    async def __call__(self, message: Message, writer: asyncio.StreamWriter) -> None:
+        if isinstance(decode_request(message.pdu), ReadDictionary):
+            self.seen.append(decode_request(message.pdu))
+            writer.transport.abort()
+            self.hung_up()
+            return
+        await super().__call__(message, writer)
+
+    def hung_up(self) -> None:
+        """Called then."""
+
+
+async def test_a_device_that_hangs_up_on_fc_101_is_read_one_by_one_on_a_new_connection() -> None:
+    bad = HangsUp()
+    wanted = [entry.address for entry in PD4E if entry.access.readable][:BULK]
+    async with small(bad) as (driver, server):
+        for _ in range(2):
+            assert await driver.read_many(1, wanted) == {address: bad.dictionary.objects[address] for address in wanted}
+        assert (bad.count(ReadDictionary), server.connections) == (1, 2)
+
+
+async def test_a_device_that_hangs_up_for_good_ends_a_long_list_by_a_clear_error(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(app.drivers.modbus, "_RETURN_S", 0.2)
+    bad = HangsUp()
+    wanted = [entry.address for entry in PD4E if entry.access.readable][:BULK]
+    async with small(bad) as (driver, server):
+        listening = server._server
+        assert listening is not None
+        monkeypatch.setattr(bad, "hung_up", listening.close)
+        with pytest.raises(BusLostError, match="FC 101") as caught:
+            await driver.read_many(1, wanted)
+        assert caught.value.details["node"] == 1
 
 
 # -- what the device really has ------------------------------------------------------------

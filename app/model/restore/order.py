@@ -31,8 +31,13 @@ def order(
     """Writes in their order, with the changes of mode that they need; and the places for which there is no order."""
     walk = Walk(station, rows, rules, options)
     homing = [row for row in rows if walk.mode_needed(row.place) is not None]
-    ordinary = [row for row in rows if row not in homing]
+    gates = {row.place: found for row in rows if (found := walk.gate_of(row.place)) is not None}
+    closing = {gate for gate, _ in gates.values()}
+    ordinary = [row for row in rows if row not in homing and row.place not in gates and row.place not in closing]
     waiting = _advance(walk, ordinary)
+    for gate, opened in dict.fromkeys(gates.values()):
+        behind = [row for row in rows if gates.get(row.place) == (gate, opened)]
+        waiting += _behind_gate(walk, behind, gate, opened, next((row for row in rows if row.place == gate), None))
     for slug in dict.fromkeys(row.place.slug for row in homing):
         own = [row for row in homing if row.place.slug == slug]
         waiting += _in_their_mode(walk, own, options.leave_modes.get(slug, _mode(walk, slug, states)))
@@ -65,6 +70,24 @@ def _in_their_mode(walk: Walk, rows: list[PlanRow], leave: int | None) -> list[P
     elif leave:
         walk.set_mode(slug, leave)
     return waiting
+
+
+def _behind_gate(walk: Walk, rows: list[PlanRow], gate: Place, opened: int, own: PlanRow | None) -> list[PlanRow]:
+    """Write what can be written only while ``gate`` holds ``opened``, then the gate itself; gives what still waits.
+
+    ``own``: the gate's row, where it is to be written too; else it is put back to what it holds.
+    """
+    before = walk.value(gate)
+    if before is None:
+        return rows if own is None else [*rows, own]
+    if before != opened:
+        walk.set_gate(gate, opened)
+    waiting = _advance(walk, rows)
+    if before != opened and len(waiting) == len(rows):
+        walk.take_back_gate(gate, before)
+    elif own is None and before != opened:
+        walk.set_gate(gate, before)
+    return waiting if own is None else [*waiting, *_advance(walk, [own])]
 
 
 def _advance(walk: Walk, rows: Sequence[PlanRow]) -> list[PlanRow]:

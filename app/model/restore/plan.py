@@ -33,7 +33,7 @@ class Why(Enum):
     OTHER_UNIT = "other-unit"
     """Bound to a machine, and it is not proven that this is the same one."""
     NETWORK = "network"
-    """Decides at which address the device is found: it is set at the device, never by a restore."""
+    """Decides at which address the device is found: it goes along only where a person chose that."""
     NEEDS_EXPERT = "needs-expert"
     READ_ONLY = "read-only"
     UNREADABLE = "unreadable"
@@ -75,6 +75,7 @@ class Step:
     """One step. ``place`` and ``raw`` for writes, ``device`` (its slug) for the others; none of them for CONFIRM.
 
     ``until``: the step is done only when this object shows ``raw``; where it is None, reading ``place`` back proves it.
+    ``category``: what a SAVE makes permanent, None for all.
     """
 
     kind: StepKind
@@ -82,6 +83,7 @@ class Step:
     place: Place | None = None
     raw: Raw | None = None
     until: Place | None = None
+    category: str | None = None
 
 
 class Need(Enum):
@@ -96,6 +98,7 @@ class Plan:
     """A restore of one station.
 
     ``restarts``: devices that must restart before all of it takes effect, because of the places ``after_restart``.
+    ``new_address``: written places that decide at which address the device is found after its next restart.
     ``findings``: what the rules say of the station as it will be; ``blockers``: those of them that forbid the restore;
     ``unordered``: places for which no order of writes keeps all stepwise rules and limits, in the station as it is
     with all other rows written.
@@ -110,6 +113,13 @@ class Plan:
     blockers: tuple[Finding, ...] = ()
     unordered: tuple[Place, ...] = ()
     after_restart: tuple[Place, ...] = ()
+    new_address: tuple[Place, ...] = ()
+
+    @property
+    def gates(self) -> tuple[Place, ...]:
+        """Objects that are written only so that others can be, and put back by a value of their own."""
+        auxiliary = (step for step in self.steps if step.kind is StepKind.AUXILIARY and step.until is None)
+        return tuple(dict.fromkeys(step.place for step in auxiliary if step.place is not None))
 
     @property
     def runnable(self) -> bool:

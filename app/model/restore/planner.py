@@ -14,6 +14,7 @@ from typing import Any, Final
 
 from app.model.address import Address
 from app.model.datatypes import Raw
+from app.model.description import RestoreClass
 from app.model.restore.order import order
 from app.model.restore.plan import Need, Plan, PlanRow, Step, StepKind, Treatment
 from app.model.restore.rows import rows_of
@@ -22,6 +23,7 @@ from app.model.restore.wanted import DeviceState, PlanOptions, Values
 from app.model.rules.all_rules import ALL
 from app.model.rules.check import broken_in, check_station
 from app.model.rules.rule import Finding, Rule, Severity, Verdict
+from app.model.saving import Category, saves_for
 from app.model.station import Place, StationValues, station_slug
 
 _AFTER_RESTART: Final[Mapping[str, Mapping[Address, int]]] = {"oat-pmc": {Address(0x60FB, 3): 0x0001}}
@@ -56,13 +58,14 @@ def make_plan(
     return Plan(
         station=station_slug(devices[0].slug) if devices else "",
         rows=rows,
-        steps=(*steps, *_last_steps(steps, options)),
+        steps=(*steps, *_last_steps(station, steps, options)),
         needs=_needs(steps),
         restarts=tuple(dict.fromkeys(place.slug for place in after_restart)),
         findings=findings,
         blockers=_blockers(findings, check_station(station, rules), options),
         unordered=unordered,
         after_restart=after_restart,
+        new_address=tuple(row.place for row in writes if _is_network(station, row)),
     )
 
 
@@ -77,7 +80,7 @@ def plan_hash(plan: Plan) -> str:
         "station": plan.station,
         "values": [[*_place(row.place), row.treatment.value, _text(row.now), _text(row.wanted)] for row in done],
         "skipped": [[*_place(row.place), row.why.value] for row in plan.rows if row.why is not None],
-        "steps": [[one.kind.value, one.device, _place(one.place), _text(one.raw)] for one in plan.steps],
+        "steps": [_step(one) for one in plan.steps],
         "unordered": [_place(place) for place in plan.unordered],
         "blockers": [[one.rule_id, [_place(place) for place in one.places]] for one in plan.blockers],
     }
@@ -93,14 +96,26 @@ def _after(station: StationValues, writes: Iterable[PlanRow]) -> StationValues:
     return StationValues(tuple(replace(one, values=values[one.slug]) for one in station.devices))
 
 
-def _last_steps(steps: Sequence[Step], options: PlanOptions) -> list[Step]:
+def _last_steps(station: StationValues, steps: Sequence[Step], options: PlanOptions) -> list[Step]:
     """A person confirms what stands in RAM; then it is made permanent and proven, device by device."""
     written = list(dict.fromkeys(step.device for step in steps if step.kind is StepKind.WRITE))
     saved = written if options.save is None else sorted(options.save)
     last = [Step(StepKind.CONFIRM, "")] if options.confirm and (written or saved) else []
-    last += [Step(StepKind.SAVE, slug) for slug in saved]
+    last += [
+        Step(StepKind.SAVE, slug, category=one) for slug in saved for one in _categories(station, slug, steps, options)
+    ]
     last += [Step(StepKind.RESTART, slug) for slug in saved if options.restart]
     return last + [Step(StepKind.PROVE, slug) for slug in dict.fromkeys((*written, *saved))]
+
+
+def _categories(station: StationValues, slug: str, steps: Sequence[Step], options: PlanOptions) -> tuple[Category, ...]:
+    """What is saved of a device: each category of what is written."""
+    if options.save is not None:
+        return options.categories.get(slug, (None,))
+    device = station.device(slug)
+    places = [step.place for step in steps if step.place is not None and step.device == slug]
+    kept = () if device is None else saves_for(device.description, (place.address for place in places))
+    return kept or (None,)
 
 
 def _needs(steps: Iterable[Step]) -> dict[str, tuple[Need, ...]]:
@@ -111,9 +126,17 @@ def _needs(steps: Iterable[Step]) -> dict[str, tuple[Need, ...]]:
 
 def _acts_at_start(station: StationValues, row: PlanRow) -> bool:
     device = station.device(row.place.slug)
-    known = {} if device is None else _AFTER_RESTART.get(device.description.id, {})
-    mask = known.get(row.place.address, 0)
+    if device is None:
+        return False
+    if _is_network(station, row):
+        return True
+    mask = _AFTER_RESTART.get(device.description.id, {}).get(row.place.address, 0)
     return isinstance(row.now, int) and isinstance(row.wanted, int) and bool((row.now ^ row.wanted) & mask)
+
+
+def _is_network(station: StationValues, row: PlanRow) -> bool:
+    device = station.device(row.place.slug)
+    return device is not None and device.description.entry(row.place.address).restore is RestoreClass.NETWORK
 
 
 def _blockers(findings: Iterable[Finding], before: Iterable[Finding], options: PlanOptions) -> tuple[Finding, ...]:
@@ -133,6 +156,11 @@ def _blockers(findings: Iterable[Finding], before: Iterable[Finding], options: P
         and one.verdict is Verdict.BROKEN
         and not (one.rule_id in accepted and (one.rule_id, one.places) in broken)
     )
+
+
+def _step(step: Step) -> list[Any]:
+    part = [] if step.category is None else [step.category]
+    return [step.kind.value, step.device, _place(step.place), _text(step.raw), *part]
 
 
 def _place(place: Place | None) -> list[str]:

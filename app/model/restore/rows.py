@@ -63,7 +63,7 @@ def _refusal(
     """Why a value that differs is not written, None where it is. What the person chose comes last."""
     if entry.restore is RestoreClass.UNIT and not options.same_unit.get(device.slug, False):
         return Why.OTHER_UNIT, {}
-    if entry.restore is RestoreClass.NETWORK:
+    if entry.restore is RestoreClass.NETWORK and not options.network:
         return Why.NETWORK, {}
     if entry.restore is RestoreClass.FACTORY and not options.expert:
         return Why.NEEDS_EXPERT, {}

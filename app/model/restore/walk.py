@@ -56,6 +56,29 @@ class Walk:
             return None
         return needed.values[0]
 
+    def gate_of(self, place: Place) -> tuple[Place, int] | None:
+        """The parameter that must hold a value while this one is written, and that value; as the count of a mapping."""
+        description = self._devices[place.slug].description
+        for condition in self.entry(place).requires:
+            gate = description.entries.get(condition.address)
+            if gate is not None and gate.address != MODE_SHOWN and gate.is_parameter and gate.access.writable:
+                return Place(place.slug, gate.address), condition.values[0]
+        return None
+
+    def value(self, place: Place) -> Raw | None:
+        """What the object holds now."""
+        return self._values[place.slug].get(place.address)
+
+    def set_gate(self, place: Place, raw: Raw) -> None:
+        """A step that writes a gate only so that others can be written, or puts it back."""
+        self._put(place, raw)
+        self.steps.append(Step(StepKind.AUXILIARY, place.slug, place, raw))
+
+    def take_back_gate(self, place: Place, before: Raw) -> None:
+        """Forgets the last step, which wrote a gate that held ``before``."""
+        self._put(place, before)
+        self.steps.pop()
+
     def shown_mode(self, slug: str) -> Raw | None:
         """What the mode of operation display shows."""
         return self._values[slug].get(MODE_SHOWN)

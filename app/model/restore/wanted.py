@@ -8,6 +8,7 @@ from typing import Protocol
 
 from app.model.address import Address
 from app.model.datatypes import Raw
+from app.model.saving import Category
 from app.model.station import Place
 
 
@@ -52,8 +53,9 @@ class PlanOptions:
     ``returning``: the wanted values stood in these devices before (a rollback, or going on with a restore): nothing
     that is broken at the end forbids it. ``leave_modes``: the mode of operation, by slug, in which a device is left
     where it is not the present one, because a restore was cut off in homing mode. ``save``: devices that are saved,
-    None for those that are written to; a rollback saves only where a save was begun. ``confirm``: a person confirms
-    before anything is saved.
+    None for those that are written to; a rollback saves only where a save was begun. ``categories``: what is saved of
+    these, by slug, all where it is not named. ``confirm``: a person confirms before anything is saved. ``network``:
+    what decides at which address a device is found goes along.
     """
 
     selected: frozenset[Place] | None = None
@@ -64,4 +66,6 @@ class PlanOptions:
     returning: bool = False
     leave_modes: Mapping[str, int] = field(default_factory=dict)
     save: frozenset[str] | None = None
+    categories: Mapping[str, tuple[Category, ...]] = field(default_factory=dict)
     confirm: bool = True
+    network: bool = False

@@ -18,7 +18,8 @@ TEXT_KEYS: Final = frozenset(
     f"journal.{end}"
     for end in """
     connected disconnected bus_lost bus_back other_master consent recording_started recording_stopped recording_lost
-    written write_failed saved save_failed restart stop_sent feather_sent foreign_written store_failed store_back
+    written write_failed saved saved_part save_failed save_refused save_proven save_not_proven restart stop_sent
+    feather_sent foreign_written store_failed store_back
     settings_changed controller_order fault_set fault_seen fault_cleared faults_cleared fault_ended scenario_started
     scenario_stopped scenario_ended incident_made restore_begun restore_confirmed restore_turned_back restore_resumed
     restore_done restore_rolled_back restore_incomplete restore_given_up nmt_sent lease_taken lease_ended
@@ -34,6 +35,7 @@ _NUMBERS: Final = frozenset({"count", "from_ns", "to_ns", "step_ns", "wall_ns", 
 _REASONS: Final = frozenset(one.value for kind in (BlockReason, LossReason) for one in kind)
 _ABORT: Final = re.compile(r"[0-9A-F]{8}h")
 _ADDRESS: Final = re.compile(r"[0-9A-F]{4}(:[0-9A-F]{2})?")
+_CATEGORY: Final = re.compile(r"category\.[a-z0-9_]{1,20}")
 _VALUE: Final = re.compile(r"[-+]?[0-9]{1,12}(\.[0-9]{1,9})?|[0-9A-Fa-f]{1,8}h")
 
 
@@ -74,6 +76,8 @@ class Harmless:
             return value in TEXT_KEYS
         if key == "reason":
             return value in _REASONS or bool(_ABORT.fullmatch(value))
+        if key == "category_key":
+            return bool(_CATEGORY.fullmatch(value))
         if key == "address":
             return bool(_ADDRESS.fullmatch(value))
         return key in ("was", "now") and bool(_VALUE.fullmatch(value)) and self._is_described(event)

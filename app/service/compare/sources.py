@@ -11,15 +11,17 @@ from app.drivers.contract import TWIN_NAME
 from app.errors import MomentError, RecordingError, SetUnknownError
 from app.model.address import Address, parse_address
 from app.model.datatypes import Raw
+from app.model.description import Description
 from app.model.diff.column import Column
 from app.model.set_head import Taking
 from app.model.set_import import read_set_file
 from app.model.set_record import SetRecord, Tag
 from app.model.sets import Origin, ParameterSet, iso_time
+from app.model.variant import as_variant, variant_of
 from app.service.compare.ground import Ground
 from app.service.compare.known import Known, defaults_of, ram_of, stored_of
 from app.service.compare.spec import ColumnKind, ColumnSpec, Unresolved, parse_moment, parse_spec
-from app.service.devices import Target
+from app.service.devices import Target, who_is
 from app.service.library.library import Library
 from app.service.library.recovered import Seen
 from app.service.office.visits import known_empty
@@ -145,8 +147,15 @@ class Columns:
         if found is None:
             raise Unresolved.NO_DEVICE.error(str(spec))
         device, description = found
-        values = defaults_of(description, device.node)
+        values = defaults_of(self._as_connected(description, spec), device.node)
         return Shown(spec, Column(device.slug, description, description.version, values))
+
+    def _as_connected(self, description: Description, spec: ColumnSpec) -> Description:
+        """With the defaults of the variant that is connected there; what rests on the variant is open else."""
+        target = self.ground.target(spec.of)
+        identity = None if target is None else who_is(target)
+        variant = None if identity is None else variant_of(description, identity.device_name, identity.product_code)
+        return description if variant is None else as_variant(description, variant)
 
     # -- sets -----------------------------------------------------------------------
 

@@ -206,6 +206,6 @@ class Library:
 
 def with_plate(parameters: ParameterSet, plate: Nameplate | None) -> ParameterSet:
     """The set with what was typed of the device's plate, where the device itself tells no serial number."""
-    if plate is None or parameters.identity.serial:
+    if plate is None or parameters.identity.mark is not None:
         return parameters
     return replace(parameters, identity=replace(parameters.identity, nameplate=plate.serial))

@@ -132,8 +132,7 @@ def compare(
         elif was_raw != now_raw:
             writer = writers.get((target.slug, entry.address.short))
             rows.append(_row(target.description, entry, then, now, writer))
-    serials = then.identity.serial, now.identity.serial
-    replaced = None not in serials and serials[0] != serials[1]
+    replaced = then.identity.has_other_serial(now.identity)
     return DeviceChanges(target.slug, tuple(rows), tuple(unknown), None, replaced)
 
 

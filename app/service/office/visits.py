@@ -208,8 +208,7 @@ def _as_left(target: Target, kept: ParameterSet | None, known: ParameterSet) -> 
 
 def _is_another(kept: ParameterSet, known: ParameterSet) -> bool:
     """True where another device, or another kind of device, stands there now."""
-    serials = kept.identity.serial, known.identity.serial
-    return kept.description_id != known.description_id or (None not in serials and serials[0] != serials[1])
+    return kept.description_id != known.description_id or kept.identity.has_other_serial(known.identity)
 
 
 def as_known(

@@ -26,7 +26,16 @@ DASH: Final = "–"
 YES: Final = "✓"
 SHORT_HASH: Final = 16
 _UNSEEN: Final = {"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"}
-_IDENTITY: Final = ("device_name", "hardware", "software", "vendor_id", "product_code", "revision", "serial")
+_IDENTITY: Final = (
+    "device_name",
+    "hardware",
+    "software",
+    "vendor_id",
+    "product_code",
+    "revision",
+    "serial",
+    "drive_serial",
+)
 _HEXADECIMAL: Final = {"vendor_id", "product_code", "revision"}
 
 

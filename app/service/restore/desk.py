@@ -285,6 +285,8 @@ class Desk:
             identities={one["slug"]: Identity(**one["identity"]) for one in details["devices"]},
             nameplates=self._nameplates(),
             others_confirmed=details["expert"] and details["others_confirmed"],
+            categories={slug: tuple(some) for slug, some in details.get("categories", {}).items()},
+            network=details.get("network", False),
         )
         return Transaction(hands, log, terms)
 

@@ -11,7 +11,7 @@ from app.model.restore.plan import Plan, StepKind, Treatment
 from app.model.rules.rule import Finding
 from app.model.sets import ParameterSet
 from app.service.connection import Connection
-from app.service.gate import adapter_of
+from app.service.gate import place_of
 from app.service.restore.prepare import Prepared
 
 
@@ -20,7 +20,7 @@ def details_of(
 ) -> dict[str, Any]:
     """The document. ``before``: ids of the records with the values before, ``nameplates`` as known, both by slug."""
     order, plan = prepared.order, prepared.plan
-    adapters = {bus.name: adapter_of(bus.connection) for bus in connection.turbine.buses}
+    buses = {bus.name: bus.connection for bus in connection.turbine.buses}
     devices = []
     for target in prepared.targets:
         slug, found = target.slug, prepared.found.sets[target.slug]
@@ -28,7 +28,7 @@ def details_of(
         devices.append(
             {
                 "slug": slug,
-                "adapter": adapters.get(target.device.bus, ""),
+                "adapter": place_of(target.device, buses.get(target.device.bus, "")).adapter,
                 "node": target.node,
                 "description": [target.description.id, target.description.version],
                 "identity": replace(found.identity, nameplate=nameplates.get(slug)).as_json(),
@@ -45,13 +45,24 @@ def details_of(
         "others_confirmed": order.others_confirmed,
         "plan_hash": prepared.hash,
         "modes": {slug: one.mode for slug, one in prepared.found.states.items() if one.mode},
-        "saves": [step.device for step in plan.steps if step.kind is StepKind.SAVE],
+        "saves": list(dict.fromkeys(step.device for step in plan.steps if step.kind is StepKind.SAVE)),
+        "categories": _categories(plan),
+        "network": order.network,
         "needs": {slug: [need.value for need in needs] for slug, needs in plan.needs.items()},
         "after_restart": list(plan.restarts),
         "skipped": _skipped(plan),
         "writes": [[row.place.slug, str(row.place.address)] for row in plan.rows if row.treatment is Treatment.WRITE],
         "findings": [_finding(one) for one in plan.findings],
     }
+
+
+def _categories(plan: Plan) -> dict[str, list[str]]:
+    """What is saved of each device, where that is not all of it."""
+    found: dict[str, list[str]] = {}
+    for step in plan.steps:
+        if step.kind is StepKind.SAVE and step.category is not None:
+            found.setdefault(step.device, []).append(step.category)
+    return found
 
 
 def reference(parameters: ParameterSet, record: str) -> dict[str, str]:

@@ -10,7 +10,7 @@ from typing import Any
 from app.errors import UsageError
 from app.service.connection import Connection
 from app.service.devices import Target
-from app.service.gate import BARE_TURBINE, adapter_of
+from app.service.gate import BARE_TURBINE, Place, adapter_of, place_of
 from app.service.journal import Kind
 from app.service.restore.log import Kept, RestoreLog, event
 from app.service.restore.order import Broken, Cause
@@ -36,12 +36,12 @@ def require_same_places(connection: Connection, kept: Kept, targets: Iterable[Ta
     """On a bus without names a device is known by its place. Raises UsageError where this is another one."""
     if connection.turbine.slug != BARE_TURBINE:
         return
-    adapters = {bus.name: adapter_of(bus.connection) for bus in connection.turbine.buses}
-    places = {one["slug"]: (adapter_of(one["adapter"]), one["node"]) for one in kept.details["devices"]}
+    buses = {bus.name: bus.connection for bus in connection.turbine.buses}
+    places = {one["slug"]: Place(adapter_of(one["adapter"]), one["node"]) for one in kept.details["devices"]}
     for target in targets:
-        if places[target.slug] != (adapters[target.device.bus], target.node):
-            adapter, node = places[target.slug]
-            raise UsageError(reason=f"the restore is of node {node} at {adapter}: connect to that one")
+        then = places[target.slug]
+        if then != place_of(target.device, buses[target.device.bus]):
+            raise UsageError(reason=f"the restore is of node {then.node} at {then.adapter}: connect to that one")
 
 
 def take_up(connection: Any, now_ns: int) -> list[RestoreRow]:

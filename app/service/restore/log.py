@@ -73,6 +73,12 @@ class Kept:
         """Devices whose non-volatile memory may hold other values than before."""
         return frozenset(one.device for one in self.steps if one.kind == StepKind.SAVE.value)
 
+    @property
+    def parts_begun(self) -> frozenset[Place]:
+        """Those of which single categories were saved: the entries that save them."""
+        saves = (one for one in self.steps if one.kind == StepKind.SAVE.value)
+        return frozenset(Place(one.device, parse_address(one.address)) for one in saves if one.address is not None)
+
 
 async def load(store: Store, restore_id: str) -> Kept | None:
     """One restore with all its rows. Raises StoreError."""
@@ -99,6 +105,7 @@ class RestoreLog:
         self.state = kept.row.state
         self.outcome = kept.outcome
         self.saves_begun = set(kept.saves_begun)
+        self.parts_begun = set(kept.parts_begun)
 
     def tell(self, text_key: str, person: str = "", **details: str) -> None:
         """Something that happened to the restore as a whole; kept with the next state."""
@@ -127,6 +134,7 @@ class RestoreLog:
         self._running = step
         if kind is StepKind.SAVE:
             self.saves_begun.add(device)
+            self.parts_begun |= {place} if place is not None else set()
 
     def ended(self, state: StepState, error: HubsideError | None = None, **details: Any) -> None:
         """What became of the step; kept with the next intent or state."""

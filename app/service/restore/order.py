@@ -27,7 +27,8 @@ class Order:
 
     ``given`` by slug of the device. ``selected``: None takes everything that may be taken. ``confirm_s``: how long the
     person has to confirm before all is rolled back; None: confirmed already. ``others_confirmed``: an expert answers
-    for the other blades, which are not in feather. ``accepted``: rules that an expert lets stay broken.
+    for the other blades, which are not in feather. ``accepted``: rules that an expert lets stay broken. ``network``:
+    what decides at which address a device is found goes along.
     ``homeless``: sets that no device of the station is of the kind for.
     """
 
@@ -43,6 +44,7 @@ class Order:
     others_confirmed: bool = False
     accepted: frozenset[str] = frozenset()
     homeless: tuple[Given, ...] = ()
+    network: bool = False
 
     def options(self, same_unit: Mapping[str, bool]) -> PlanOptions:
         """What the planner needs of it."""
@@ -52,6 +54,7 @@ class Order:
             expert=self.expert,
             restart=self.restart,
             accepted=self.accepted,
+            network=self.network,
         )
 
 
@@ -77,6 +80,8 @@ class Objection(Enum):
     NOTHING_TO_DO = "nothing-to-do"
     NO_DEVICE = "no-device"
     OTHER_DEVICE_TYPE = "other-device-type"
+    OTHER_VARIANT = "other-variant"
+    """Another device of the same description, with another motor: an expert may answer for it."""
     DESCRIPTION = "description"
     FIRMWARE = "firmware"
     IDENTITY = "identity"
@@ -91,6 +96,8 @@ class Objection(Enum):
     RESTORE_OPEN = "restore-open"
     RULES = "rules"
     NO_ORDER = "no-order"
+    NEW_ADDRESS = "new-address"
+    """A restart would bring another address into force: the device could not be read again at the end."""
 
     @property
     def text_key(self) -> str:

@@ -9,9 +9,11 @@ from typing import Final
 from app.errors import DeviceError, NoAnswerError
 from app.model.address import Address
 from app.model.datatypes import Raw
+from app.model.description import Description
 from app.model.restore.plan import Plan, StepKind
 from app.model.sets import Identity, ParameterSet
-from app.model.values import to_scaled
+from app.model.values import quantity_of, to_scaled
+from app.model.variant import variant_of
 from app.recording.writer import RecorderState
 from app.service.backup import read_device
 from app.service.connection import Connection
@@ -47,6 +49,9 @@ def objections_to_plan(plan: Plan) -> Iterator[Refusal]:
     if plan.unordered:
         places = ", ".join(f"{place.slug.rpartition('/')[2]} {place.address.short}" for place in plan.unordered)
         yield Refusal(Objection.NO_ORDER, "", {"addresses": places})
+    if any(step.kind is StepKind.RESTART for step in plan.steps):
+        for slug in dict.fromkeys(place.slug for place in plan.new_address):
+            yield Refusal(Objection.NEW_ADDRESS, slug)
     if not any(step.kind is StepKind.WRITE for step in plan.steps) and not plan.unordered:
         yield Refusal(Objection.NOTHING_TO_DO)
 
@@ -62,6 +67,10 @@ def objections_to_sets(order: Order, found: Survey, nameplates: Mapping[str, str
         now = found.sets.get(slug)
         if now is not None:
             yield from _objections_to_set(slug, given, now, nameplates.get(slug))
+            description = next(one.target.description for one in found.reports if one.target.slug == slug)
+            was, here = _variant(description, given.parameters), _variant(description, now)
+            if not order.expert and _differ(was, here):
+                yield Refusal(Objection.OTHER_VARIANT, slug, {"set": str(was), "device": str(here)})
 
 
 def _objections_to_set(slug: str, given: Given, now: ParameterSet, nameplate: str | None) -> Iterator[Refusal]:
@@ -103,9 +112,9 @@ def objections_to_going_back(connection: Connection, found: Survey) -> Iterator[
 def is_other_device(then: Identity, now: Identity, nameplate: str | None) -> bool:
     """True where another device answers than that of a restore. ``nameplate``: as it is known now."""
     kinds = ((getattr(then, name), getattr(now, name)) for name in ("device_type", "vendor_id", "product_code"))
-    if any(_differ(one, other) for one, other in kinds) or (then.serial or 0) != (now.serial or 0):
+    if any(_differ(one, other) for one, other in kinds) or then.mark != now.mark:
         return True
-    return not then.serial and then.nameplate is not None and then.nameplate != nameplate
+    return then.mark is None and then.nameplate is not None and then.nameplate != nameplate
 
 
 def is_other_firmware(then: Identity, now: Identity) -> bool:
@@ -121,16 +130,16 @@ def is_same_unit(of_set: Identity, device: Identity, nameplate: str | None) -> b
     """
     if is_contradictory(of_set, device, nameplate):
         return False
-    if of_set.serial and device.serial:
+    if of_set.mark is not None and device.mark is not None:
         return of_set.has_serial_of(device)
     return nameplate is not None and of_set.nameplate == nameplate
 
 
 def is_contradictory(of_set: Identity, device: Identity, nameplate: str | None) -> bool:
     """True where serial number and nameplate say different things: one was exchanged since, or mistyped."""
-    if of_set.nameplate is None or nameplate is None or not of_set.serial or not device.serial:
+    if of_set.nameplate is None or nameplate is None or of_set.mark is None or device.mark is None:
         return False
-    return (of_set.nameplate == nameplate) != (of_set.serial == device.serial)
+    return (of_set.nameplate == nameplate) != (of_set.mark == device.mark)
 
 
 def objections_to_state(found: Survey) -> Iterator[Refusal]:
@@ -158,7 +167,9 @@ def _objections_to_drive(target: Target, values: Mapping[Address, Raw], status: 
     if speed is None and VELOCITY in target.description.entries and isinstance(status, int):
         yield Refusal(Objection.DRIVE_UNKNOWN, target.slug)
     if speed is not None and abs(speed) > STANDSTILL_DPS:
-        yield Refusal(Objection.DRIVE_MOVING, target.slug, {"speed": f"{speed:.2f}"})
+        entry = target.description.entry(VELOCITY)
+        unit = quantity_of(entry, values.get).unit
+        yield Refusal(Objection.DRIVE_MOVING, target.slug, {"speed": f"{speed:.2f}", "unit": unit})
 
 
 def objections_to_surroundings(connection: Connection, now_ns: int) -> Iterator[Refusal]:
@@ -238,6 +249,13 @@ def _differ(one: object, other: object) -> bool:
     return one is not None and other is not None and one != other
 
 
+def _variant(description: Description, parameters: ParameterSet) -> str | None:
+    """Name of the variant that the set was taken from; None where that is not known, or there are none."""
+    identity = parameters.identity
+    variant = variant_of(description, identity.device_name, identity.product_code)
+    return None if variant is None else description.variant_details[variant].name
+
+
 def _kind_of(parameters: ParameterSet) -> str:
     kind = parameters.identity.device_type
     return parameters.description_id if kind is None else f"{parameters.description_id} ({kind:08X}h)"
@@ -245,4 +263,5 @@ def _kind_of(parameters: ParameterSet) -> str:
 
 def _who(identity: Identity, nameplate: str | None = None) -> str:
     plate = nameplate if nameplate is not None else identity.nameplate
-    return " / ".join(str(one) for one in (identity.serial, plate) if one is not None) or "–"
+    number = identity.serial if identity.mark is None else identity.mark
+    return " / ".join(str(one) for one in (number, plate) if one is not None) or "–"

@@ -37,12 +37,20 @@ class Prepared:
 
     @property
     def goals(self) -> dict[Place, tuple[Raw, Raw]]:
-        """Each object that the restore answers for: what stands there before, and what is wanted."""
-        return {
+        """Each object that the restore answers for: what stands there before, and what is wanted.
+
+        What is only written so that others can be is among them: whoever takes up the restore knows what it must hold.
+        """
+        goals = {
             row.place: (row.now, row.wanted)
             for row in self.plan.rows
             if row.treatment is not Treatment.SKIP and row.now is not None and row.wanted is not None
         }
+        for place in self.plan.gates:
+            now = self.found.station.raw(place)
+            if now is not None:
+                goals.setdefault(place, (now, now))
+        return goals
 
 
 async def prepare(

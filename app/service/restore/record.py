@@ -34,6 +34,7 @@ from app.service.restore.details import reference
 from app.service.restore.log import Kept, raw_of
 from app.service.restore.order import Cause, Objection
 from app.store.restore_rows import Direction, RestoreState, StepRow, StepState
+from app.wire.stored import covers
 
 _OUTCOMES: Final = {
     RestoreState.DONE: Outcome.NEW,
@@ -145,6 +146,7 @@ class RecordOf:
         unproven = {(device, str(parse_address(address))) for device, address in self._outcome.get("unproven", ())}
         for one in self._kept.values:
             write = (one.device, one.address) in writes
+            proven = reached and one.device in saved & restarted and (one.device, one.address) not in unproven
             yield self._row(
                 one.device,
                 one.address,
@@ -152,8 +154,8 @@ class RecordOf:
                 raw_of(one.before),
                 raw_of(one.wanted),
                 verified=reached,
-                saved=reached and one.device in saved,
-                proven=reached and one.device in saved & restarted and (one.device, one.address) not in unproven,
+                saved=proven or (reached and one.device in saved and self._is_saved(one.device, one.address)),
+                proven=proven,
             )
         for one in self._details["skipped"]:
             was, wanted = (_raw(one[name]) for name in ("now", "wanted"))
@@ -208,6 +210,16 @@ class RecordOf:
             for step in self._kept.steps
             if step.kind == kind.value and step.state is StepState.DONE and (step.direction is Direction.BACK) == back
         )
+
+    def _is_saved(self, device: str, address: str) -> bool:
+        """Where a device is saved by categories: whether that of the object was."""
+        commands = [
+            parse_address(step.address)
+            for step in self._kept.steps
+            if step.kind == StepKind.SAVE.value and step.device == device and step.address is not None
+        ]
+        at = parse_address(address)
+        return not commands or any(covers(self._descriptions[device], command, at) for command in commands)
 
     # -- the rest ----------------------------------------------------------------------
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import Callable, Iterable, Mapping
-from typing import Final
+from typing import Any, Final
 
 from app.drivers.contract import LinkState
 from app.errors import (
@@ -21,8 +21,9 @@ from app.errors import (
 from app.model.address import Address
 from app.model.checks import Allow
 from app.model.datatypes import Raw
-from app.model.description import RestoreClass
+from app.model.description import Bus, RestoreClass
 from app.model.restore.plan import Step, StepKind
+from app.model.saving import Category, command_of, has_categories
 from app.model.station import Place, StationValues
 from app.service.connection import Connection
 from app.service.devices import Target
@@ -33,7 +34,6 @@ from app.service.restore.log import RestoreLog, raw_text
 from app.service.restore.order import Broken, Cause, Objection, Timing
 from app.service.restore.precheck import objections_to_surroundings
 from app.service.restore.survey import (
-    STANDSTILL,
     STATUSWORD,
     VELOCITY,
     Survey,
@@ -41,9 +41,10 @@ from app.service.restore.survey import (
     is_driven,
     read_integer,
     read_whole,
+    standstill,
 )
 from app.service.save import restart, save
-from app.service.stop import CONTROLWORD
+from app.service.stop import CONTROLWORD, has_feather
 from app.service.whole import whole
 from app.service.write import write_raw
 from app.store.restore_rows import Direction, StepState
@@ -152,7 +153,7 @@ class Hands:
         """Wait until all axes stand: a restart opens the safety chain, and that of another device may drive ours."""
         until = self.monotonic() + self.timing.quiet_s
         for target in self._watched:
-            while abs(await self._integer(target, VELOCITY) or 0) > STANDSTILL:
+            while abs(await self._integer(target, VELOCITY) or 0) > standstill(target.description):
                 if self.monotonic() > until:
                     raise Broken(Cause.DRIVE_ENABLED, target.slug)
                 await asyncio.sleep(LOOK_S)
@@ -160,7 +161,7 @@ class Hands:
     async def _not_feathered(self, slug: str) -> None:
         """A FEATHER that somebody has sent is not cut short by a restart: it stands in the controlword."""
         for target in self._watched:
-            if CONTROLWORD not in target.description.entries:
+            if CONTROLWORD not in target.description.entries or not has_feather(target):
                 continue
             word = await self._integer(target, CONTROLWORD)
             if word is not None and word & _FEATHER:
@@ -259,7 +260,7 @@ class Hands:
         word = await self._integer(target, CONTROLWORD)
         if word is None or not word & _ENABLE_OPERATION:
             return
-        if word & _FEATHER:
+        if word & _FEATHER and has_feather(target):
             raise Broken(Cause.DRIVE_ENABLED, target.slug)
         place = Place(target.slug, CONTROLWORD)
         await self._log.intend(direction, StepKind.AUXILIARY, target.slug, place, SHUTDOWN)
@@ -309,13 +310,14 @@ class Hands:
             raise Broken(cause_of(error), "", error) from error
         self.look_for_restarts()
 
-    async def save(self, slug: str, direction: Direction) -> None:
+    async def save(self, slug: str, direction: Direction, category: Category = None) -> None:
         """1010h, and wait until the device is ready again. From its intent on the memory is in doubt."""
         target = self.targets[slug]
         await self.guard(direction)
-        await self._log.intend(direction, StepKind.SAVE, slug)
+        await self._log.intend(direction, StepKind.SAVE, slug, self._entry_of(target, category))
+        driver, stamper = self.connection.driver(target), self.connection.stamper
         try:
-            took = await whole(save(self.connection.driver(target), target, self._journal, self.connection.stamper))
+            took = await whole(save(driver, target, self._journal, stamper, category))
         except HubsideError as error:
             self._log.ended(_state_after(error), error)
             self._not_overtaken()
@@ -325,8 +327,14 @@ class Hands:
         await self._answers(target)
         self.look_for_restarts()
 
+    def _entry_of(self, target: Target, category: Category) -> Place | None:
+        """The entry that saves a category; None where the device saves all that it has."""
+        if not has_categories(target.description):
+            return None
+        return Place(target.slug, command_of(target.description.save, category).address)
+
     async def restart(self, slug: str, direction: Direction) -> None:
-        """NMT reset node, the boot-up message, and the first answer."""
+        """Restart the device, wait until it says that it is back, and for the first answer."""
         target = self.targets[slug]
         await self._still()
         self.look_for_restarts()
@@ -345,8 +353,14 @@ class Hands:
             self._log.ended(_state_after(error), error)
             raise Broken(cause_of(error), slug, error) from error
         await self._answers(target)
-        self._log.ended(StepState.DONE, took_s=round(took.took_s, 3))
+        known: dict[str, Any] = {"took_s": round(took.took_s, 3)}
+        if took.proven is not None:
+            known["proven"] = took.proven
+        self._log.ended(StepState.DONE, **known)
         self._boots[slug] = max(before + 1, boots_of(target))
+        if target.description.bus is Bus.MODBUS_TCP:
+            bus = target.device.bus  # its connection does not outlive the restart that we asked for
+            self._reconnects[bus] = self.connection.buses[bus].status.reconnects
 
     async def prove(
         self, slug: str, goals: Mapping[Place, Raw], found: Survey, direction: Direction, restarted: bool

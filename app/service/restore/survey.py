@@ -12,6 +12,7 @@ from app.errors import HubsideError, NoAnswerError, UsageError
 from app.model.address import Address
 from app.model.axis_state import ENERGISED, FOLLOWING, AxisState
 from app.model.datatypes import Raw
+from app.model.description import Description
 from app.model.restore.wanted import DeviceState
 from app.model.sets import ParameterSet
 from app.model.station import StationValues, station_of
@@ -25,7 +26,7 @@ VELOCITY: Final = Address(0x606C)
 STANDSTILL: Final = 10
 """Velocity in position units a second up to which an axis stands: 0.1 degrees a second as delivered."""
 PIECE: Final = 16
-"""So many objects are asked for before it is looked whether the device answers at all."""
+"""So many objects are asked for before it is looked whether the device answers at all, where the driver does not."""
 Progress = Callable[[int, int], None]
 
 
@@ -82,8 +83,9 @@ async def read_whole(
     wanted = readable(target.description) if addresses is None else list(addresses)
     values: dict[Address, Raw] = {}
     failed: dict[Address, HubsideError] = {}
-    for at in range(0, len(wanted), PIECE):
-        report = await read_device(driver, target, wanted[at : at + PIECE])
+    piece = max(1, len(wanted)) if driver.ends_when_silent else PIECE
+    for at in range(0, len(wanted), piece):
+        report = await read_device(driver, target, wanted[at : at + piece], None if piece == PIECE else on_progress)
         silent = (error for error in report.failed.values() if isinstance(error, NoAnswerError))
         if (error := next(silent, None)) is not None:
             raise report.lost or error
@@ -113,6 +115,13 @@ def stage_on(status: int) -> bool:
 def is_driven(status: int) -> bool:
     """True where a statusword says that the axis follows something: set-points, a quick stop, a fault reaction."""
     return AxisState.of(status) in FOLLOWING
+
+
+def standstill(description: Description) -> int:
+    """Up to this velocity (606Ch, raw) an axis stands. Where its unit can be chosen, no more than 0 is sure."""
+    entry = description.entries.get(VELOCITY)
+    rule = None if entry is None else entry.quantity_rule
+    return 0 if rule is not None and rule.choices else STANDSTILL
 
 
 def boots_of(target: Target) -> int:

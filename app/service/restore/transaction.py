@@ -19,6 +19,7 @@ from app.model.description import Description
 from app.model.restore.plan import Plan, Step, StepKind
 from app.model.restore.planner import make_plan
 from app.model.restore.wanted import PlanOptions, Wanted
+from app.model.saving import Category
 from app.model.sets import Identity
 from app.model.station import Place
 from app.service.journal import Kind
@@ -45,6 +46,7 @@ class End(Enum):
 class Terms:
     """What was agreed at the beginning. ``modes``: of operation, by slug, as they were; ``saves``: devices to save.
 
+    ``categories``: what is saved of them, by slug, all where it is not named. ``network``: their addresses go along.
     ``identities``: of the devices when it began; ``nameplates`` as they are known now, by slug. ``others_confirmed``:
     an expert has answered for the other blades.
     """
@@ -60,6 +62,8 @@ class Terms:
     identities: Mapping[str, Identity] = field(default_factory=dict)
     nameplates: Mapping[str, str | None] = field(default_factory=dict)
     others_confirmed: bool = False
+    categories: Mapping[str, tuple[Category, ...]] = field(default_factory=dict)
+    network: bool = False
 
     def wanted(self, direction: Direction) -> dict[Place, Raw]:
         """The values that a way leads to."""
@@ -184,7 +188,7 @@ class Transaction:
         await self._log.enter(
             RestoreState.WRITING, cause=None, cause_details=None, error=None, device=None, first_cause=None
         )
-        options = self._options(self._terms.saves)
+        options = self._options(self._terms.saves, self._terms.categories)
         plan = await self._plan(Direction.RESUME, options)
         return await self._go(self._all_steps(plan, Direction.RESUME), Direction.RESUME, None)
 
@@ -195,7 +199,7 @@ class Transaction:
             self._hands.decided(self._back_commands)
             self._tell(Kind.RESTORE_TURNED_BACK, self._back_by)
         await self._log.enter(RestoreState.ROLLING_BACK, **known)
-        options = self._options(frozenset(self._log.saves_begun))
+        options = self._options(frozenset(self._log.saves_begun), self._categories_begun())
         plan = await self._plan(Direction.BACK, options)
         return await self._go(self._all_steps(plan, Direction.BACK), Direction.BACK, None)
 
@@ -232,7 +236,16 @@ class Transaction:
         if broken is not None:
             raise broken
 
-    def _options(self, saves: frozenset[str]) -> PlanOptions:
+    def _categories_begun(self) -> dict[str, tuple[Category, ...]]:
+        """What of each device its memory may hold otherwise than before."""
+        found: dict[str, tuple[Category, ...]] = {}
+        for slug, description in self.descriptions.items():
+            begun = {place.address for place in self._log.parts_begun if place.slug == slug}
+            if begun:
+                found[slug] = tuple(one.category for one in description.save if one.address in begun)
+        return found
+
+    def _options(self, saves: frozenset[str], categories: Mapping[str, tuple[Category, ...]]) -> PlanOptions:
         """For values that stood in these very devices, or were agreed to for them."""
         slugs = {place.slug for place in self._terms.goals}
         return PlanOptions(
@@ -242,7 +255,9 @@ class Transaction:
             returning=True,
             leave_modes=self._terms.modes,
             save=saves,
+            categories=categories,
             confirm=False,
+            network=self._terms.network,
         )
 
     def _all_steps(self, plan: Plan, direction: Direction) -> Sequence[Step]:
@@ -291,7 +306,7 @@ class Transaction:
         elif step.kind is StepKind.CONFIRM:
             await self._confirm(direction, confirm_s)
         elif step.kind is StepKind.SAVE:
-            await self._hands.save(step.device, direction)
+            await self._hands.save(step.device, direction, step.category)
         elif step.kind is StepKind.RESTART:
             await self._hands.restart(step.device, direction)
 

@@ -177,18 +177,32 @@ class WriteDone(BaseModel):
     t_ns: int
 
 
+class SaveRequest(BaseModel):
+    """``category``: what of the device is saved, one of its description's ``save``; null saves all."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    category: Annotated[str, Field(max_length=40)] | None = None
+
+
 class SaveDone(BaseModel):
-    """The device acknowledged the save."""
+    """The device acknowledged the save, and says that it has ended. Not proven before a restart."""
 
     t_ns: int
     took_s: float
+    category: str | None
 
 
 class RestartDone(BaseModel):
-    """The device has booted again."""
+    """The device has booted again.
+
+    ``proven``: whether the last save before it is in force, by its date and time (1020h); null where the device keeps
+    none, or no save of it was seen. Values are proven when they are read.
+    """
 
     boot_up_t_ns: int
     took_s: float
+    proven: bool | None
 
 
 class AxisDone(BaseModel):

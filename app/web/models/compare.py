@@ -160,6 +160,7 @@ class CompareRow(BaseModel):
     address: str
     group: str
     restore: RestoreClassName
+    save_category: str | None
     name: str
     state: RowStateName
     rescaled: bool
@@ -175,6 +176,7 @@ class CompareRow(BaseModel):
             address=row.address.short,
             group=row.entry.group,
             restore=row.entry.restore.value,
+            save_category=row.entry.save_category,
             name=row.entry.title,
             state=row.state.value,
             rescaled=row.rescaled,

@@ -44,7 +44,8 @@ class RestorePlanRequest(BaseModel):
     set of what a motor puts into its drive. ``selected`` null takes everything that may be taken. ``restart``: a
     restart of the devices is agreed to. ``expert``: what only the maker sets is restored too; that needs the role, and
     ``other_blades_confirmed`` (the expert answers for blades that are not in feather) and ``accepted`` (rules that may
-    stay broken where they are broken already) are refused without it.
+    stay broken where they are broken already) are refused without it. ``network``: what decides at which address a
+    device is found goes along; never together with a restart.
     """
 
     model_config = ConfigDict(extra="forbid")
@@ -55,6 +56,7 @@ class RestorePlanRequest(BaseModel):
     restart: bool = False
     expert: bool = False
     other_blades_confirmed: bool = False
+    network: bool = False
     accepted: Annotated[list[Annotated[str, Field(max_length=100)]], Field(max_length=100)] = []
 
 
@@ -95,6 +97,7 @@ class RestorePlanRow(BaseModel):
     name: str
     group: str
     restore_class: Literal["copy", "unit", "factory", "network", "never"] | None
+    save_category: str | None
     unit: str
     treatment: Literal["write", "equal", "skip"]
     why: str | None
@@ -107,10 +110,11 @@ class RestorePlanRow(BaseModel):
 
 
 class RestorePlanStep(BaseModel):
-    """One step; ``device`` is empty for the confirmation."""
+    """One step; ``device`` is empty for the confirmation. ``category``: what a save keeps, null for all."""
 
     kind: StepKindName
     device: str
+    category: str | None
     address: str | None
     name: str | None
     shown: str | None
@@ -185,6 +189,7 @@ class RestoreValue(BaseModel):
     device: str
     address: str
     name: str
+    save_category: str | None
     unit: str
     before_raw: RawJson
     wanted_raw: RawJson
@@ -195,9 +200,10 @@ class RestoreValue(BaseModel):
 
 
 class RestoreStepDoc(BaseModel):
-    """One step as it was begun, and what became of it."""
+    """One step as it was begun, and what became of it. ``category``: what a save keeps, null for all."""
 
     n: int
+    category: str | None
     direction: Literal["forward", "resume", "back"]
     kind: StepKindName
     device: str

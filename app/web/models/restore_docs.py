@@ -109,6 +109,7 @@ def _row(row: PlanRow, station: StationValues) -> RestorePlanRow:
         name="" if entry is None else entry.title,
         group="" if entry is None else entry.group,
         restore_class=None if entry is None else entry.restore.value,
+        save_category=None if entry is None else entry.save_category,
         unit="" if entry is None else quantity_of(entry, lookup).unit,
         treatment=row.treatment.value,
         why=None if row.why is None else row.why.value,
@@ -130,6 +131,7 @@ def _step(step: Step, station: StationValues) -> RestorePlanStep:
     return RestorePlanStep(
         kind=step.kind.value,
         device=step.device,
+        category=step.category,
         address=None if step.place is None else step.place.address.short,
         name=None if entry is None else entry.title,
         shown=shown,
@@ -226,6 +228,7 @@ def _values(kept: Kept, descriptions: Descriptions) -> list[RestoreValue]:
                 device=value.device,
                 address=parse_address(value.address).short,
                 name=name,
+                save_category=_save_category(descriptions, value.device, value.address),
                 unit=unit,
                 before_raw=_raw(before),
                 wanted_raw=_raw(wanted),
@@ -250,6 +253,7 @@ def _step_doc(step: StepRow, kept: Kept, descriptions: Descriptions) -> RestoreS
         shown = _words(kept, descriptions, step.device, step.address)[2](raw_of(step.raw))
     return RestoreStepDoc(
         n=step.n,
+        category=_category(step, descriptions),
         direction=step.direction.value,
         kind=StepKind(step.kind).value,
         device=step.device,
@@ -260,6 +264,21 @@ def _step_doc(step: StepRow, kept: Kept, descriptions: Descriptions) -> RestoreS
         ended_ns=step.ended_ns,
         error=_failure(json.loads(step.details).get("error"), step.address or ""),
     )
+
+
+def _category(step: StepRow, descriptions: Descriptions) -> str | None:
+    """What a save keeps; None for all, and for other steps."""
+    description = descriptions(step.device)
+    if step.kind != StepKind.SAVE.value or step.address is None or description is None:
+        return None
+    entry = parse_address(step.address)
+    return next((one.category for one in description.save if one.address == entry), None)
+
+
+def _save_category(descriptions: Descriptions, device: str, address: str) -> str | None:
+    description = descriptions(device)
+    entry = None if description is None else description.entries.get(parse_address(address))
+    return None if entry is None else entry.save_category
 
 
 def _words(kept: Kept, descriptions: Descriptions, device: str, address: str) -> tuple[str, str, Callable[[Raw], str]]:

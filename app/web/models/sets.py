@@ -46,6 +46,7 @@ class SetIdentity(BaseModel):
     revision: int | None
     serial: int | None
     nameplate: str | None
+    drive_serial: str | None
 
 
 class SetTag(BaseModel):

@@ -14,7 +14,7 @@ from app.service.save import restart, save
 from app.service.views import raw_from_json, raw_to_json
 from app.service.write import write_raw
 from app.web.deps import DEVICE, BenchOf, ConnectionOf, JobsOf, JournalOf, PersonOf, TargetOf, needs
-from app.web.models import JobDoc, Nothing, ReadRequest, RestartDone, SaveDone, WriteDone, WriteRequest
+from app.web.models import JobDoc, Nothing, ReadRequest, RestartDone, SaveDone, SaveRequest, WriteDone, WriteRequest
 from app.web.routes.jobs import job_doc
 
 router = APIRouter(dependencies=[needs(Role.TECHNICIAN)])
@@ -64,10 +64,10 @@ async def write(
 
 
 @router.post(f"{DEVICE}/save")
-async def save_device(connection: ConnectionOf, journal: JournalOf, target: TargetOf, _request: Nothing) -> SaveDone:
-    """Make the device's parameters non-volatile, and wait until it acknowledges."""
-    took = await save(connection.driver(target), target, journal, connection.stamper)
-    return SaveDone(t_ns=took.t_ns, took_s=took.took_s)
+async def save_device(connection: ConnectionOf, journal: JournalOf, target: TargetOf, request: SaveRequest) -> SaveDone:
+    """Make the device's parameters non-volatile, all or those of one category, and wait until it acknowledges."""
+    took = await save(connection.driver(target), target, journal, connection.stamper, request.category)
+    return SaveDone(t_ns=took.t_ns, took_s=took.took_s, category=request.category)
 
 
 @router.post(f"{DEVICE}/restart")
@@ -76,4 +76,4 @@ async def restart_device(
 ) -> RestartDone:
     """Restart the device, and wait until it has booted."""
     took = await restart(connection.driver(target), target, journal, connection.stamper)
-    return RestartDone(boot_up_t_ns=took.t_ns, took_s=took.took_s)
+    return RestartDone(boot_up_t_ns=took.t_ns, took_s=took.took_s, proven=took.proven)

@@ -150,6 +150,7 @@ async def _order(bench: Bench, connection: Connection, person: SignedIn, request
         others_confirmed=request.other_blades_confirmed,
         accepted=frozenset(request.accepted),
         homeless=homeless,
+        network=request.network,
     )
 
 

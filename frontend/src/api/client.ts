@@ -125,7 +125,8 @@ export const commands = {
   write: (slug: string, address: string, raw: Raw) =>
     post<WriteResult>(`${device(slug)}/write`, { address, raw }),
   writes: (order: WritesRequest) => post<Job>("/api/live/writes", order),
-  save: (slug: string) => post<SaveResult>(`${device(slug)}/save`, {}),
+  save: (slug: string, category: string | null = null) =>
+    post<SaveResult>(`${device(slug)}/save`, { category }),
   restart: (slug: string) => post<RestartResult>(`${device(slug)}/restart`, {}),
   verify: (slug: string) => post<VerifyResult>(`${device(slug)}/verify`, {}),
   consent: () => post<object>("/api/live/consent", {}),

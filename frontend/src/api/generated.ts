@@ -1387,7 +1387,7 @@ export interface paths {
         put?: never;
         /**
          * Save Device
-         * @description Make the device's parameters non-volatile, and wait until it acknowledges.
+         * @description Make the device's parameters non-volatile, all or those of one category, and wait until it acknowledges.
          */
         post: operations["save_device"];
         delete?: never;
@@ -4929,6 +4929,8 @@ export interface components {
              * @enum {string}
              */
             restore: "copy" | "unit" | "factory" | "network" | "never";
+            /** Save Category */
+            save_category: string | null;
             /**
              * State
              * @enum {string}
@@ -8490,10 +8492,15 @@ export interface components {
         /**
          * RestartDone
          * @description The device has booted again.
+         *
+         *     ``proven``: whether the last save before it is in force, by its date and time (1020h); null where the device keeps
+         *     none, or no save of it was seen. Values are proven when they are read.
          */
         RestartDone: {
             /** Boot Up T Ns */
             boot_up_t_ns: number;
+            /** Proven */
+            proven: boolean | null;
             /** Took S */
             took_s: number;
         };
@@ -8679,7 +8686,8 @@ export interface components {
          *     set of what a motor puts into its drive. ``selected`` null takes everything that may be taken. ``restart``: a
          *     restart of the devices is agreed to. ``expert``: what only the maker sets is restored too; that needs the role, and
          *     ``other_blades_confirmed`` (the expert answers for blades that are not in feather) and ``accepted`` (rules that may
-         *     stay broken where they are broken already) are refused without it.
+         *     stay broken where they are broken already) are refused without it. ``network``: what decides at which address a
+         *     device is found goes along; never together with a restart.
          */
         RestorePlanRequest: {
             /**
@@ -8692,6 +8700,11 @@ export interface components {
              * @default false
              */
             expert: boolean;
+            /**
+             * Network
+             * @default false
+             */
+            network: boolean;
             /**
              * Other Blades Confirmed
              * @default false
@@ -8732,6 +8745,8 @@ export interface components {
             now_shown: string | null;
             /** Restore Class */
             restore_class: ("copy" | "unit" | "factory" | "network" | "never") | null;
+            /** Save Category */
+            save_category: string | null;
             /**
              * Treatment
              * @enum {string}
@@ -8750,11 +8765,13 @@ export interface components {
         };
         /**
          * RestorePlanStep
-         * @description One step; ``device`` is empty for the confirmation.
+         * @description One step; ``device`` is empty for the confirmation. ``category``: what a save keeps, null for all.
          */
         RestorePlanStep: {
             /** Address */
             address: string | null;
+            /** Category */
+            category: string | null;
             /** Device */
             device: string;
             /**
@@ -8805,6 +8822,11 @@ export interface components {
              * @default false
              */
             expert: boolean;
+            /**
+             * Network
+             * @default false
+             */
+            network: boolean;
             /**
              * Other Blades Confirmed
              * @default false
@@ -8857,13 +8879,15 @@ export interface components {
         };
         /**
          * RestoreStepDoc
-         * @description One step as it was begun, and what became of it.
+         * @description One step as it was begun, and what became of it. ``category``: what a save keeps, null for all.
          */
         RestoreStepDoc: {
             /** Address */
             address: string | null;
             /** Begun Ns */
             begun_ns: number;
+            /** Category */
+            category: string | null;
             /** Device */
             device: string;
             /**
@@ -8904,6 +8928,8 @@ export interface components {
             device: string;
             /** Name */
             name: string;
+            /** Save Category */
+            save_category: string | null;
             /**
              * State
              * @enum {string}
@@ -9130,13 +9156,23 @@ export interface components {
         };
         /**
          * SaveDone
-         * @description The device acknowledged the save.
+         * @description The device acknowledged the save, and says that it has ended. Not proven before a restart.
          */
         SaveDone: {
+            /** Category */
+            category: string | null;
             /** T Ns */
             t_ns: number;
             /** Took S */
             took_s: number;
+        };
+        /**
+         * SaveRequest
+         * @description ``category``: what of the device is saved, one of its description's ``save``; null saves all.
+         */
+        SaveRequest: {
+            /** Category */
+            category?: string | null;
         };
         /**
          * ScanDoc
@@ -9480,6 +9516,8 @@ export interface components {
             device_name: string | null;
             /** Device Type */
             device_type: number | null;
+            /** Drive Serial */
+            drive_serial: string | null;
             /** Hardware */
             hardware: string | null;
             /** Nameplate */
@@ -17407,8 +17445,12 @@ export interface operations {
         };
         requestBody: {
             content: {
-                /** @example {} */
-                "application/json": components["schemas"]["Nothing"];
+                /**
+                 * @example {
+                 *       "category": "tuning"
+                 *     }
+                 */
+                "application/json": components["schemas"]["SaveRequest"];
             };
         };
         responses: {

@@ -65,8 +65,8 @@ export function DeviceActions() {
         </Button>
       )}
       {dialog === Dialog.Verify && <VerifyDialog onClose={close} />}
-      {dialog === Dialog.Save && <SaveDialog entries={doc.entries} onClose={close} />}
-      {dialog === Dialog.Restart && <RestartDialog entries={doc.entries} onClose={close} />}
+      {dialog === Dialog.Save && <SaveDialog doc={doc} onClose={close} />}
+      {dialog === Dialog.Restart && <RestartDialog doc={doc} onClose={close} />}
     </div>
   );
 }

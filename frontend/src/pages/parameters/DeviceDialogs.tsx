@@ -1,12 +1,13 @@
-import { Alert, Button, Group, Loader, Stack, Text } from "@mantine/core";
+import { Alert, Button, Group, Loader, Radio, Stack, Text } from "@mantine/core";
 import { IconAlertTriangle, IconCircleCheck } from "@tabler/icons-react";
 import { useMutation } from "@tanstack/react-query";
-import type { ReactNode } from "react";
+import { type ReactNode, useState } from "react";
 import { commands } from "../../api/client";
-import type { EntryDoc } from "../../api/types";
+import type { DescriptionDoc, EntryDoc } from "../../api/types";
 import { useDeviceVersion, useStore } from "../../live/live";
 import { figure } from "../../model/values";
 import { titleOf } from "../../model/rows";
+import { categoriesOf, categoryName } from "../../model/saving";
 import { useTexts } from "../../texts/texts";
 import { useDeviceName } from "../../ui/devices";
 import { HoldButton } from "../../ui/HoldButton";
@@ -14,34 +15,53 @@ import { ProblemAlert } from "../../ui/ProblemAlert";
 import { isStoredUnknown, isUnsaved } from "./cellValue";
 import { useDevice } from "./context";
 import { Dialog } from "../../ui/Dialog";
+import classes from "./Parameters.module.css";
 
 interface Props {
-  entries: readonly EntryDoc[];
+  doc: DescriptionDoc;
   onClose: () => void;
 }
 
 const MOST_NAMES = 6;
 
-export function SaveDialog({ entries, onClose }: Props) {
+/** All of it is saved, or one category where the device has some. */
+export function SaveDialog({ doc, onClose }: Props) {
+  const categories = categoriesOf(doc);
+  const [category, setCategory] = useState<string | null>(null);
+  const entries = category === null ? doc.entries : doc.entries.filter((one) => isKeptBy(one, category));
   return (
     <CommandDialog
       name="save"
       tone="accent"
-      run={commands.save}
+      run={(slug) => commands.save(slug, category)}
       onClose={onClose}
-      warning={<UnsavedList entries={entries} name="save" />}
+      still={categories.length > 0}
+      warning={
+        <>
+          {categories.length > 0 && (
+            <CategoryChoice
+              categories={categories}
+              entries={doc.entries}
+              value={category}
+              onChange={setCategory}
+            />
+          )}
+          <UnsavedList entries={entries} name="save" />
+        </>
+      }
     />
   );
 }
 
-export function RestartDialog({ entries, onClose }: Props) {
+export function RestartDialog({ doc, onClose }: Props) {
   return (
     <CommandDialog
       name="restart"
       tone="danger"
       run={commands.restart}
       onClose={onClose}
-      warning={<UnsavedList entries={entries} name="restart" />}
+      still={doc.bus !== "canopen"}
+      warning={<UnsavedList entries={doc.entries} name="restart" />}
     />
   );
 }
@@ -49,13 +69,15 @@ export function RestartDialog({ entries, onClose }: Props) {
 interface CommandProps {
   name: "save" | "restart";
   tone: "accent" | "danger";
-  run: (slug: string) => Promise<{ took_s: number }>;
+  run: (slug: string) => Promise<{ took_s: number; proven?: boolean | null }>;
+  /** The device does it at standstill only, and by itself: no NMT, no safety chain. */
+  still: boolean;
   warning: ReactNode;
   onClose: () => void;
 }
 
 /** Says what will happen to which device, and acts only on a held button. */
-function CommandDialog({ name, tone, run, warning, onClose }: CommandProps) {
+function CommandDialog({ name, tone, run, still, warning, onClose }: CommandProps) {
   const t = useTexts();
   const { slug } = useDevice();
   const device = useDeviceName()(slug);
@@ -64,7 +86,7 @@ function CommandDialog({ name, tone, run, warning, onClose }: CommandProps) {
   return (
     <Dialog opened onClose={onClose} title={<Text fw={700}>{t(key("title"), { device })}</Text>} size="lg">
       <Stack gap="md">
-        <Text>{t(key("explain"), { device })}</Text>
+        <Text>{t(key(still ? "explain_still" : "explain"), { device })}</Text>
         {command.isIdle && warning}
         {command.isPending && (
           <Group role="status">
@@ -82,6 +104,7 @@ function CommandDialog({ name, tone, run, warning, onClose }: CommandProps) {
             {t(key("done"), { device, seconds: figure(command.data.took_s, 1, t.language) })}
           </Alert>
         )}
+        {command.data?.proven != null && <Proof proven={command.data.proven} />}
         {command.isError && <ProblemAlert error={command.error} title={t(key("failed"), { device })} />}
         <Group justify="flex-end">
           <Button variant="default" onClick={onClose} data-autofocus data-testid={`${name}-close`}>
@@ -101,6 +124,70 @@ function CommandDialog({ name, tone, run, warning, onClose }: CommandProps) {
         </Group>
       </Stack>
     </Dialog>
+  );
+}
+
+/** Whether what was saved before the restart is in force: by the date and time that the device keeps with it. */
+function Proof({ proven }: { proven: boolean }) {
+  const t = useTexts();
+  return (
+    <Alert
+      color={proven ? "green" : "red"}
+      variant="light"
+      icon={proven ? <IconCircleCheck aria-hidden /> : <IconAlertTriangle aria-hidden />}
+      data-testid="restart-proof"
+    >
+      {t(`page.saving.${proven ? "proven" : "not_proven"}`)}
+    </Alert>
+  );
+}
+
+/** True where a save of the category keeps the value; what has none goes with each. */
+const isKeptBy = (entry: EntryDoc, category: string): boolean =>
+  entry.save_category === null || entry.save_category === category;
+
+interface ChoiceProps {
+  categories: readonly string[];
+  entries: readonly EntryDoc[];
+  value: string | null;
+  onChange: (category: string | null) => void;
+}
+
+const EVERYTHING = "";
+
+/** What is saved: all, or one category; behind each, how many values of it are known to be unsaved. */
+function CategoryChoice({ categories, entries, value, onChange }: ChoiceProps) {
+  const t = useTexts();
+  const { slug } = useDevice();
+  const store = useStore();
+  useDeviceVersion(slug);
+  const unsaved = entries.filter((entry) => isUnsaved(entry, store.cell(slug, entry.address)));
+  return (
+    <Radio.Group
+      label={t("page.saving.what")}
+      value={value ?? EVERYTHING}
+      onChange={(text) => onChange(text === EVERYTHING ? null : text)}
+      data-testid="save-category"
+    >
+      <div className={classes.categories}>
+        {[null, ...categories].map((one) => {
+          const count = unsaved.filter((entry) => one === null || entry.save_category === one).length;
+          return (
+            <Radio
+              key={one ?? EVERYTHING}
+              value={one ?? EVERYTHING}
+              label={
+                <span className={classes.category}>
+                  {categoryName(one, t)}
+                  <small className={count === 0 ? "dim" : ""}>{t("page.saving.count", { count })}</small>
+                </span>
+              }
+              data-testid={`save-category-${one ?? "all"}`}
+            />
+          );
+        })}
+      </div>
+    </Radio.Group>
   );
 }
 

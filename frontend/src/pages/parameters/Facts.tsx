@@ -1,10 +1,10 @@
 import { useQueries } from "@tanstack/react-query";
 import { IconQuestionMark } from "@tabler/icons-react";
 import type { EntryDoc } from "../../api/types";
-import { restsOn } from "../../model/values";
 import { type ParameterRow, titleOf } from "../../model/rows";
+import { categoryName } from "../../model/saving";
 import { limitText } from "../../model/shown";
-import { isHex, quantityOf } from "../../model/values";
+import { isHex, quantityOf, restsOn } from "../../model/values";
 import { useBenchOfTable, useDevice } from "./context";
 import { detailsOf, historyQuery } from "./history";
 import classes from "./Parameters.module.css";
@@ -32,7 +32,7 @@ export function Facts({ row, onOpen }: Props) {
   if (doc.save.some((command) => command.category !== null) && entry.saved)
     facts.splice(3, 0, [
       "category",
-      t(entry.save_category === null ? "page.entry.any_category" : `category.${entry.save_category}`),
+      entry.save_category === null ? t("page.entry.any_category") : categoryName(entry.save_category, t),
     ]);
   const needs = entry.requires.map(({ address, values }) => `${address} = ${values.map(String).join(", ")}`);
   if (needs.length > 0) facts.push(["requires", needs.join("; ")]);

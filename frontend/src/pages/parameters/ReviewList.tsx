@@ -9,9 +9,10 @@ import { useDeviceVersion, useWatchDevice } from "../../live/live";
 import { asks, FindingKind, planOf, type PlannedRow, stops } from "../../model/findings";
 import { titleOf } from "../../model/rows";
 import { pendingOf, touching } from "../../model/ruleFindings";
+import { categoryName, savesFor } from "../../model/saving";
 import { type DeviceContext, lineOf, shownOf } from "../../model/shown";
 import { type Change, keyOf } from "../../model/staged";
-import { useTexts } from "../../texts/texts";
+import { type Translate, useTexts } from "../../texts/texts";
 import { type Place, useDeviceName } from "../../ui/devices";
 import { HoldButton } from "../../ui/HoldButton";
 import { useContexts } from "./devicesOf";
@@ -237,7 +238,7 @@ function DeviceBlock({ plan, turns, save, onSave }: BlockProps) {
         <h3>{name}</h3>
         <span className="dim">{t("page.review.rows", { count: plan.rows.length })}</span>
         <Checkbox
-          label={t("page.review.save_after")}
+          label={saveLabel(plan, t)}
           checked={save}
           onChange={onSave}
           data-testid={`save-after-${plan.slug}`}
@@ -255,6 +256,19 @@ function DeviceBlock({ plan, turns, save, onSave }: BlockProps) {
       </ol>
     </section>
   );
+}
+
+/** The categories that are saved are named, where the device has some. */
+function saveLabel({ context, rows }: DevicePlan, t: Translate): string {
+  const saves = context
+    ? savesFor(
+        context.doc,
+        rows.map((row) => row.change.address),
+      )
+    : [];
+  const parts = saves.filter((one) => one !== null).map((one) => categoryName(one, t));
+  if (parts.length === 0) return t("page.review.save_after");
+  return t("page.saving.after", { categories: parts.join(", ") });
 }
 
 interface RowProps {

@@ -1,6 +1,7 @@
 import { Checkbox } from "@mantine/core";
 import { IconChevronDown, IconChevronRight } from "@tabler/icons-react";
 import { memo, type ReactNode } from "react";
+import { categoryName } from "../../../model/saving";
 import { useTexts } from "../../../texts/texts";
 import { BitCells, FactsCells, ValueCell } from "./Cells";
 import type { ColumnContext } from "./compared";
@@ -141,6 +142,7 @@ function Entry({ line, columns, against, picked, actions }: Props & { line: RowL
             <small>
               {row.address}
               {known?.objectName != null && ` · ${known.objectName}`}
+              {row.save_category !== null && ` · ${categoryName(row.save_category, t)}`}
             </small>
           </span>
         </button>

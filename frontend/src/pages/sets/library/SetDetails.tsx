@@ -131,10 +131,9 @@ function Identity({ record }: { record: SetRecord }) {
     <div>
       <h3>{t("page.sets.identity")}</h3>
       <Pairs
-        pairs={Object.entries(record.identity).map(([name, text]) => [
-          t(`page.sets.identity_of.${name}`),
-          text === null ? "–" : String(text),
-        ])}
+        pairs={Object.entries(record.identity)
+          .filter(([name, text]) => name !== "drive_serial" || text !== null)
+          .map(([name, text]) => [t(`page.sets.identity_of.${name}`), text === null ? "–" : String(text)])}
       />
     </div>
   );

@@ -2,6 +2,7 @@ import { IconAlertTriangle } from "@tabler/icons-react";
 import { useMemo } from "react";
 import type { DescriptionDoc, Raw, SetDoc } from "../../../api/types";
 import { titleOf } from "../../../model/rows";
+import { categoriesOf, categoryName } from "../../../model/saving";
 import { lineOf, shownOf } from "../../../model/shown";
 import { useTexts } from "../../../texts/texts";
 import { dayAndTime } from "../../../ui/format";
@@ -18,6 +19,7 @@ export function ValueTable({ doc, description }: Props) {
   const t = useTexts();
   const { device, node } = doc.record.origin;
   const rows = useMemo(() => Object.entries(doc.values).toSorted(([a], [b]) => a.localeCompare(b)), [doc]);
+  const parts = description !== undefined && categoriesOf(description).length > 0;
   const words = (address: string, raw: Raw) => {
     const entry = description && entriesOf(description).get(address);
     const lookup = (other: string) => doc.values[other] ?? null;
@@ -31,6 +33,7 @@ export function ValueTable({ doc, description }: Props) {
           <th>{t("page.table.column.address")}</th>
           <th>{t("page.table.column.name")}</th>
           <th>{t("page.sets.in_set")}</th>
+          {parts && <th>{t("page.saving.category")}</th>}
           {doc.seen && <th>{t("page.sets.seen", { recording: doc.recording ?? "" })}</th>}
         </tr>
       </thead>
@@ -42,6 +45,7 @@ export function ValueTable({ doc, description }: Props) {
               <td>{address}</td>
               <td>{entry ? titleOf(entry, t) : "–"}</td>
               <td title={t("page.entry.raw_only", { raw })}>{words(address, raw)}</td>
+              {parts && <td>{entry?.save_category == null ? "–" : categoryName(entry.save_category, t)}</td>}
               {doc.seen && (
                 <td>
                   <SeenText seen={doc.seen[address]} />

@@ -20,7 +20,7 @@ export const nameOf = (record: SetRecord) =>
 
 /** The serial number that the device tells, else that on its plate. */
 export const serialOf = ({ identity }: SetRecord) =>
-  identity.serial ? String(identity.serial) : (identity.nameplate ?? "");
+  identity.serial ? String(identity.serial) : (identity.drive_serial ?? identity.nameplate ?? "");
 
 export function Completeness({ record }: { record: SetRecord }) {
   const t = useTexts();

@@ -9,6 +9,7 @@ import {
 } from "@tabler/icons-react";
 import { useMemo } from "react";
 import { usePageSearch } from "../../../frame/search";
+import { categoryName } from "../../../model/saving";
 import { type Translate, useTexts } from "../../../texts/texts";
 import { DataTable, type TableColumn } from "../../../ui/DataTable";
 import { GroupMenu } from "./GroupMenu";
@@ -35,7 +36,8 @@ export function PlanTable({ lines, onPick, reading, onReadAgain }: Props) {
   const [search, update] = usePageSearch();
   const view = viewIn(search.rows);
   const shown = useMemo(() => lines.filter((line) => inView(line, view)), [lines, view]);
-  const columns = useMemo(() => columnsOf(t, onPick), [t, onPick]);
+  const parts = lines.some((line) => line.row.save_category !== null);
+  const columns = useMemo(() => columnsOf(t, onPick, parts), [t, onPick, parts]);
   const toggle = (line: PlanLine) => {
     if (isPickable(line)) onPick([line], !isPicked(line));
   };
@@ -80,8 +82,15 @@ export function PlanTable({ lines, onPick, reading, onReadAgain }: Props) {
   );
 }
 
-function columnsOf(t: Translate, onPick: Props["onPick"]): TableColumn<PlanLine>[] {
+/** `parts`: a device saves by categories, so that each object has one. */
+function columnsOf(t: Translate, onPick: Props["onPick"], parts: boolean): TableColumn<PlanLine>[] {
   const title = (id: string) => t(`page.restoring.column.${id}`);
+  const category: TableColumn<PlanLine> = {
+    id: "category",
+    title: t("page.saving.category"),
+    width: "minmax(96px, 0.5fr)",
+    text: ({ row }) => (row.save_category === null ? "–" : categoryName(row.save_category, t)),
+  };
   return [
     {
       id: "pick",
@@ -138,6 +147,7 @@ function columnsOf(t: Translate, onPick: Props["onPick"]): TableColumn<PlanLine>
         </span>
       ),
     },
+    ...(parts ? [category] : []),
   ];
 }
 

@@ -1,7 +1,15 @@
 import { Checkbox, Switch } from "@mantine/core";
-import { IconCircleCheck, IconListCheck, IconRefresh, IconShieldX, IconTool } from "@tabler/icons-react";
+import {
+  IconAlertTriangle,
+  IconCircleCheck,
+  IconListCheck,
+  IconRefresh,
+  IconShieldX,
+  IconTool,
+} from "@tabler/icons-react";
 import type { PlanDoc, PlanSource, Refusal } from "../../../api/restore";
 import { useRole } from "../../../frame/role";
+import { categoryName } from "../../../model/saving";
 import { type Translate, useTexts } from "../../../texts/texts";
 import { useDeviceName } from "../../../ui/devices";
 import { dateAndTime } from "../../../ui/format";
@@ -32,6 +40,7 @@ export function Told(props: Props) {
       <AsExpert {...props} />
       <Refusals {...props} />
       <WhatHappens {...props} />
+      <Network {...props} />
       <Needs plan={props.plan} />
       <Findings {...props} />
     </div>
@@ -53,7 +62,8 @@ function AsExpert({ terms, onTerms }: Props) {
         checked={terms.expert}
         onChange={(event) => {
           const expert = event.currentTarget.checked;
-          onTerms(expert ? { ...terms, expert } : { ...NO_TERMS, restart: terms.restart });
+          const { restart, network } = terms;
+          onTerms(expert ? { ...terms, expert } : { ...NO_TERMS, restart, network });
         }}
         data-testid="restore-expert"
       />
@@ -113,10 +123,11 @@ function WhatHappens({ plan, station, confirmMin, terms }: Props) {
   const t = useTexts();
   const nameOf = useDeviceName();
   const writes = countBy(plan.steps.filter((step) => step.kind === "write").map((step) => step.device));
-  const saved = plan.steps.filter((step) => step.kind === "save").map((step) => nameOf(step.device));
+  const saves = plan.steps.filter((step) => step.kind === "save");
+  const parts = saves.filter((step) => step.category !== null);
   const homed = Object.keys(plan.needs);
   if (writes.size === 0) return null;
-  const devices = saved.join(t("page.restoring.and"));
+  const devices = [...new Set(saves.map((step) => nameOf(step.device)))].join(t("page.restoring.and"));
   return (
     <section data-testid="what-happens">
       <h2>
@@ -132,13 +143,22 @@ function WhatHappens({ plan, station, confirmMin, terms }: Props) {
         ))}
         <li>{t("page.restoring.happens.confirm", { minutes: confirmMin })}</li>
         <li>
-          {t("page.restoring.happens.save", { devices })}
-          <small>{t("page.restoring.happens.save_all")}</small>
+          {parts.length === 0
+            ? t("page.restoring.happens.save", { devices })
+            : t("page.saving.each", {
+                devices,
+                categories: parts.map((step) => categoryName(step.category, t)).join(", "),
+              })}
+          <small>
+            {t(parts.length === 0 ? "page.restoring.happens.save_all" : "page.saving.all_of_them")}
+          </small>
         </li>
         {terms.restart && (
           <li>
             {t("page.restoring.happens.restart", { devices })}
-            <small className="tone-warning">{t("page.restoring.happens.restart_chain")}</small>
+            {parts.length === 0 && (
+              <small className="tone-warning">{t("page.restoring.happens.restart_chain")}</small>
+            )}
           </li>
         )}
         <li>{t(`page.restoring.happens.${terms.restart ? "prove" : "prove_ram"}`)}</li>
@@ -208,6 +228,32 @@ function Needs({ plan }: { plan: PlanDoc }) {
           <IconRefresh size={16} aria-hidden /> {t("page.restoring.needs_restart", { device: nameOf(slug) })}
         </p>
       ))}
+    </section>
+  );
+}
+
+/** What decides at which address a device is found stays out until a person wants it in, and is warned of then. */
+function Network({ plan, terms, onTerms }: Props) {
+  const t = useTexts();
+  const rows = plan.rows.filter((row) => row.restore_class === "network" && row.wanted_raw !== row.now_raw);
+  const concerned = rows.filter((row) => row.treatment === "write" || row.why === "network");
+  if (concerned.length === 0 && !terms.network) return null;
+  return (
+    <section data-testid="restore-network">
+      <Switch
+        label={t("page.saving.network.switch")}
+        description={t("page.saving.network.what", {
+          addresses: concerned.map((row) => row.address).join(", "),
+        })}
+        checked={terms.network}
+        onChange={(event) => onTerms({ ...terms, network: event.currentTarget.checked })}
+        data-testid="restore-network-switch"
+      />
+      {terms.network && (
+        <p className="tone-warning" role="status">
+          <IconAlertTriangle size={16} aria-hidden /> {t("page.saving.network.warning")}
+        </p>
+      )}
     </section>
   );
 }

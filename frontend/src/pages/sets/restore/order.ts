@@ -18,9 +18,17 @@ export interface Terms {
   expert: boolean;
   othersConfirmed: boolean;
   accepted: readonly string[];
+  /** What decides at which address a device is found goes along. */
+  network: boolean;
 }
 
-export const NO_TERMS: Terms = { restart: true, expert: false, othersConfirmed: false, accepted: [] };
+export const NO_TERMS: Terms = {
+  restart: true,
+  expert: false,
+  othersConfirmed: false,
+  accepted: [],
+  network: false,
+};
 
 export const setsIn = (text: string | undefined): string[] => (text ?? "").split(",").filter(Boolean);
 
@@ -49,6 +57,7 @@ export function useOrder(terms: Terms): PlanRequest | null {
       expert: terms.expert,
       other_blades_confirmed: terms.othersConfirmed,
       accepted: [...terms.accepted],
+      network: terms.network,
     };
   }, [station, search.sets, search.select, terms]);
   return order;

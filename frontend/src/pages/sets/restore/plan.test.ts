@@ -28,6 +28,7 @@ const row = (address: string, more: Partial<PlanRow>): PlanRow => ({
   name: `name ${address}`,
   group: address.startsWith("3") ? "battery" : "drive",
   restore_class: "copy",
+  save_category: null,
   unit: "",
   treatment: "write",
   why: null,

@@ -7,6 +7,7 @@ const step = (n: number, kind: RestoreStep["kind"], more: Partial<RestoreStep> =
   direction: "forward",
   kind,
   device: "a",
+  category: null,
   address: null,
   shown: null,
   state: "done",
@@ -20,6 +21,7 @@ const value = (state: RestoreValue["state"], written: RestoreValue["written"] = 
   device: "a",
   address: "6065",
   name: "",
+  save_category: null,
   unit: "",
   before_raw: 1,
   wanted_raw: 2,
@@ -48,6 +50,13 @@ describe("how far a value is", () => {
     expect(stage(value("done", "wanted"), [...saved, step(2, "prove")])).toBe(Stage.Saved);
     const restarted = [...saved, step(2, "restart"), step(3, "prove")];
     expect(stage(value("done", "wanted"), restarted)).toBe(Stage.Proven);
+  });
+
+  it("takes a save of a category for a save of its values only", () => {
+    const tuning = [step(0, "write"), step(1, "save", { category: "tuning" })];
+    const of = (save_category: string) => ({ ...value("done", "wanted"), save_category });
+    expect(stage(of("tuning"), tuning)).toBe(Stage.Saved);
+    expect(stage(of("drive"), tuning)).toBe(Stage.ReadBack);
   });
 
   it("does not take a save that is on its way, or one of an earlier way, for a save", () => {

@@ -46,7 +46,7 @@ export enum Stage {
   Unknown = "unknown",
 }
 
-/** Devices whose values were saved, and those whose values were read again after that, on the way taken last. */
+/** Devices whose values were saved (`device category` where only these were), and those whose values were read again after that, on the way taken last. */
 export interface Kept {
   saved: ReadonlySet<string>;
   proven: ReadonlySet<string>;
@@ -59,13 +59,17 @@ export function keptOf(doc: RestoreDoc): Kept {
   const done = doc.steps.filter((step) => step.direction === direction && step.state === "done");
   const devices = (kind: string) =>
     new Set(done.filter((step) => step.kind === kind).map((step) => step.device));
-  const saved = devices("save");
+  const saves = done.filter((step) => step.kind === "save");
+  const saved = new Set(saves.map((step) => partOf(step.device, step.category)));
   // Saved values are proven by reading them once the device has started anew.
   const restarted = devices("restart");
   const read = devices("prove");
-  const proven = new Set([...saved].filter((slug) => restarted.has(slug) && read.has(slug)));
+  const proven = new Set([...devices("save")].filter((slug) => restarted.has(slug) && read.has(slug)));
   return { saved, proven, ended: doc.end !== null };
 }
+
+const partOf = (device: string, category: string | null): string =>
+  category === null ? device : `${device} ${category}`;
 
 export function stageOf(value: RestoreValue, { saved, proven, ended }: Kept): Stage {
   if (value.state === "failed") return Stage.Failed;
@@ -74,7 +78,7 @@ export function stageOf(value: RestoreValue, { saved, proven, ended }: Kept): St
   if (value.state === "done" && value.written === "before") return Stage.Back;
   if (value.state === "waiting") return ended ? Stage.Untouched : Stage.Waiting;
   if (proven.has(value.device)) return Stage.Proven;
-  if (saved.has(value.device)) return Stage.Saved;
+  if (saved.has(value.device) || saved.has(partOf(value.device, value.save_category))) return Stage.Saved;
   return value.state === "equal" ? Stage.Equal : Stage.ReadBack;
 }
 
