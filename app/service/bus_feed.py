@@ -16,17 +16,12 @@ from app.wire.decoder import CanOpenDecoder
 from app.wire.decoders import BusDecoder, decoder_of
 from app.wire.frame import Adu, Can, Frame
 from app.wire.live import LiveState
+from app.wire.modbus.adu import ETHERNET_BPS, wire_bits
 from app.wire.modbus.decoder import ModbusDecoder
 from app.wire.pdo_follower import PdoRoute
 from app.wire.records import Record
 
 GAP_REASON: Final = GAP_REASONS[EventKind.BUS_LOST]
-
-
-ETHERNET_BPS: Final = 100_000_000
-"""What the load of a Modbus TCP bus is a share of: the port of the drives (fast Ethernet)."""
-_TCP_OCTETS: Final = 14 + 20 + 20 + 24
-"""What carries an ADU: Ethernet, IP and TCP headers, check, preamble and gap."""
 
 
 class BusFeed:
@@ -71,8 +66,7 @@ class BusFeed:
             if self._modbus is not None:
                 for frame in frames:
                     if isinstance(frame.payload, Adu):
-                        bits = 8 * (len(frame.payload.data) + _TCP_OCTETS)
-                        count(frame.t_ns, bits, self._modbus.node_of(frame))
+                        count(frame.t_ns, wire_bits(len(frame.payload.data)), self._modbus.node_of(frame))
             else:
                 for t_ns, _, _, can, _ in frames:
                     if type(can) is Can:

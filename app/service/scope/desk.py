@@ -27,7 +27,7 @@ from app.service.scope.signals import number_of
 from app.service.scope.tap import Heard, Tap
 from app.service.scope.trigger import Happened, What
 from app.store.uuid7 import Uuid7
-from app.wire.records import BootUpSeen, EmcySeen, GapSeen, Source, ValueSeen
+from app.wire.records import BootUpSeen, EmcySeen, GapSeen, RestartSeen, Source, ValueSeen
 
 log = logging.getLogger(__name__)
 
@@ -328,7 +328,7 @@ def _looked_up(frozen: Sequence[Frozen]) -> tuple[list[InForce], tuple[KeptDevic
 def _happened(one: Heard) -> Happened:
     if isinstance(one, EmcySeen):
         return Happened(one.t_ns, What.EMCY, one.bus, one.node, code=one.code)
-    if isinstance(one, BootUpSeen):
+    if isinstance(one, BootUpSeen | RestartSeen):
         return Happened(one.t_ns, What.BOOT_UP, one.bus, one.node)
     return Happened(one.t_ns, What.NMT, one.bus, one.node, state=getattr(one, "state", None))
 
