@@ -46,7 +46,7 @@ class BusFeed:
         self._can = self.decoder if isinstance(self.decoder, CanOpenDecoder) else None
         self._modbus = self.decoder if isinstance(self.decoder, ModbusDecoder) else None
         self.load = BusLoad(bitrate if self._modbus is None else ETHERNET_BPS)
-        self.trace = BusTrace(name, self._can or CanOpenDecoder(name), lock)
+        self.trace = BusTrace(name, self.decoder, lock, servers)
         self.frames = 0
         self._live = live
         self._lock = lock
@@ -71,7 +71,7 @@ class BusFeed:
                 for t_ns, _, _, can, _ in frames:
                     if type(can) is Can:
                         count(t_ns, frame_bits(can), can.can_id, can.extended)
-                self.trace.take(frames)
+            self.trace.take(frames)
             records = self.decoder.feed_all(frames)
             if records:
                 self.trace.heard(records)
@@ -81,8 +81,7 @@ class BusFeed:
     def gap(self, t_ns: int, reason: str = GAP_REASON) -> None:
         """Frames are missing before ``t_ns``: what was read until then proves nothing any more."""
         with self._lock:
-            if self._can is not None:
-                self.trace.gap(t_ns, reason)
+            self.trace.gap(t_ns, reason)
             records = self.decoder.gap(t_ns, reason)
             self.trace.heard(records)
             self._missed(records)

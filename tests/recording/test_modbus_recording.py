@@ -180,7 +180,7 @@ async def test_tshark_reads_in_a_recording_what_our_decoder_reads(sample: Path, 
     frames = frames_of(sample)[:600]
     rows = await asyncio.to_thread(dissected, frames, tmp_path)
     assert len(rows) == len(frames)
-    functions = Counter()
+    functions: Counter[int] = Counter()
     for frame, row in zip(adus(frames), rows, strict=True):
         message = decode_adu(frame.data)
         assert [int(each, 0) for each in row["mbtcp.trans_id"]] == [message.transaction]

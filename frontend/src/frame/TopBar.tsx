@@ -13,7 +13,7 @@ import {
 import { useComputedColorScheme } from "@mantine/core";
 import type { LinkData, Mode, RecordingStatus } from "../api/types";
 import { useHearing, useLink, useLoadHistory, useServerNow } from "../live/live";
-import { figure } from "../model/values";
+import { figure, rateText } from "../model/values";
 import { ControlMark } from "../motion/ControlMark";
 import { type Translate, useTexts } from "../texts/texts";
 import { Sparkline } from "../ui/Sparkline";
@@ -78,7 +78,7 @@ function BusFacts({ link }: { link: LinkData | null }) {
       <div className={classes.facts}>
         <strong>{connected ? load : t(`page.link.${link.state}`)}</strong>
         <span className="dim">
-          {t("page.bus.facts", { bus: link.bus, kbit: figure(link.bitrate / 1000, 0, t.language) })}
+          {t("page.bus.facts", { bus: link.bus, kbit: rateText(link.bitrate, t.language) })}
         </span>
       </div>
       {connected && (

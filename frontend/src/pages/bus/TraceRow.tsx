@@ -5,7 +5,10 @@ import { type Translate, useTexts } from "../../texts/texts";
 import { useDeviceName } from "../../ui/devices";
 import { timeOfDay } from "../../ui/format";
 import classes from "./Bus.module.css";
-import { bytesOf, idText, noteTexts, objectName, serviceText, valueText } from "./lines";
+import { idText, noteTexts, objectName, serviceText, shownBytes, valueText } from "./lines";
+
+/** A row has no room for more objects: all of them stand in the detail. */
+const SHOWN_ITEMS = 12;
 
 interface Props {
   line: TraceLine;
@@ -48,8 +51,8 @@ export const TraceRow = memo(function TraceRow({ line, top, index, picked, query
       <span role="gridcell" className={classes.clip}>
         {serviceText(line, t)}
       </span>
-      <b role="gridcell" className={classes.bytes}>
-        {line.remote ? "RTR" : bytesOf(line.data).join(" ")}
+      <b role="gridcell" className={`${classes.bytes} ${classes.clip}`}>
+        {line.remote ? "RTR" : shownBytes(line).join(" ")}
       </b>
       <span role="gridcell" className={classes.meaning}>
         <Meaning line={line} query={query} t={t} />
@@ -64,9 +67,12 @@ function Meaning({ line, query, t }: { line: TraceLine; query: string; t: Transl
     <>
       {Sign && <Sign size={13} aria-hidden />}
       {line.step !== null && <i>{t(`trace.step.${line.step}`)}</i>}
-      {line.items.map((item, at) => (
+      {line.items.slice(0, SHOWN_ITEMS).map((item, at) => (
         <Item key={`${item.address}-${String(at)}`} item={item} query={query} t={t} />
       ))}
+      {line.items.length > SHOWN_ITEMS && (
+        <em>{t("trace.page.more_objects", { count: line.items.length - SHOWN_ITEMS })}</em>
+      )}
       {noteTexts(line, t).map((note) => (
         <em key={note}>
           <Marked text={note} query={query} />
