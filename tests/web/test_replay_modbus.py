@@ -68,7 +68,7 @@ async def test_every_read_route_answers(server: Server) -> None:
 async def test_a_series_is_what_the_decoder_says(server: Server) -> None:
     doc = await indexed(server, NAME)
     await at(server, FAULT_S)  # the unit of a position is that of the factors that are known at the cursor
-    asked = {"signal": f"{SLUG}/6064", "points": 5000}
+    asked: dict[str, str | int] = {"signal": f"{SLUG}/6064", "points": 5000}
     (series,) = (await server.client.get(f"{BASE}/series", params=asked)).json()
     assert series["exact"]
     assert series["t_s"] == [(one.t_ns - doc["from_ns"]) / 1e9 for one in seen_of(0x6064)]

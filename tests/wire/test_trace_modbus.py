@@ -125,7 +125,7 @@ def test_wherever_one_begins_the_rows_are_the_same() -> None:
         else:
             decoder.feed(item)
     tracer = ModbusTracer(SAMPLE_BUS, {1: SERVER})
-    found = []
+    found: list[TraceRow] = []
     for chunk in ring.chunks():
         tracer.restart(chunk.snapshot)
         found += tracer.rows(chunk.items())
