@@ -38,6 +38,7 @@ def test_trace_and_plot_of_a_drive_on_modbus_tcp(home: Home) -> None:
     expect(rows.last).to_contain_text("FC", timeout=WAIT_MS)
 
     page.get_by_test_id("trace-q").fill("603F")
+    expect(rows.filter(has_not_text="603F")).to_have_count(0)
     answer = rows.filter(has_text="8611h").first
     expect(answer).to_contain_text("FC 43 resp")
     answer.click()

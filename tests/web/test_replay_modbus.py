@@ -112,6 +112,7 @@ async def test_the_trace_names_device_function_and_objects(server: Server) -> No
     assert answer["step"] == "registers-both"
     named = {item["address"]: item for item in answer["items"]}
     assert {"6040", "607A", "6041", "6064"} <= named.keys()
+    assert answer["items"][0]["address"] == "6041", "what the drive gave before what it got"
     assert answer["start_t_ns"] < answer["t_ns"]
     assert answer["peer"] == "192.168.2.10:49152"
     assert int(answer["data"][:4], 16) == answer["transaction"]

@@ -26,6 +26,7 @@ from app.wire.records import (
     Outcome,
     RestartSeen,
     SdoSeen,
+    Source,
     StateSeen,
     SyncSeen,
     TransactionSeen,
@@ -196,9 +197,10 @@ def items_of(row: TraceRow, namer: Namer) -> Iterable[TraceItem]:
     if row.address is not None:
         yield namer.item(bus, node, row.address, row.value)
     elif row.speaker.service in _CARRYING:
-        for record in row.records:
-            if isinstance(record, ValueSeen) and record.node == node:
-                yield namer.item(bus, node, record.address, record.data)
+        values = [record for record in row.records if isinstance(record, ValueSeen) and record.node == node]
+        # Of an exchange both ways what the device gave comes first: what was written is known from before.
+        for record in sorted(values, key=lambda one: one.source is Source.PDO_RX):
+            yield namer.item(bus, node, record.address, record.data)
 
 
 def notes_of(row: TraceRow, namer: Namer) -> Iterable[TraceNote]:
