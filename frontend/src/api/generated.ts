@@ -10465,6 +10465,9 @@ export interface components {
         /**
          * TraceLine
          * @description One frame, or a gap in the traffic. ``start_t_ns``: the first request of the transfer that this frame ended.
+         *
+         *     Of Modbus TCP ``transaction`` is set, ``peer`` is the client's end of the connection, ``number`` the function
+         *     code and ``dlc`` the bytes of the ADU; ``can_id`` is 0.
          */
         TraceLine: {
             /** Bus */
@@ -10492,6 +10495,8 @@ export interface components {
             notes: components["schemas"]["TraceNote"][];
             /** Number */
             number: number;
+            /** Peer */
+            peer: string | null;
             /** Remote */
             remote: boolean;
             /** Service */
@@ -10509,6 +10514,8 @@ export interface components {
              * @enum {string}
              */
             tone: "plain" | "warning" | "error";
+            /** Transaction */
+            transaction: number | null;
         };
         /**
          * TraceMessage
