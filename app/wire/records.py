@@ -97,6 +97,10 @@ class Fault(Enum):
     """A field has a value that the protocol does not know."""
     OPTION = "option"
     """An option that the device does not have."""
+    DELIMITER = "delimiter"
+    """A PROFIBUS telegram does not begin or end with its delimiter."""
+    CHECKSUM = "checksum"
+    """The check sum (FCS) of a PROFIBUS telegram does not fit its bytes."""
 
     @property
     def text_key(self) -> str:
