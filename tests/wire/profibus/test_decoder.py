@@ -15,7 +15,7 @@ from app.wire.decoders import decoder_of, decoder_of_frame, decoder_of_state
 from app.wire.frame import Can, Direction, Fdl, Frame
 from app.wire.live import LiveState
 from app.wire.profibus import dp, pkw
-from app.wire.profibus.control import Reply
+from app.wire.profibus.control import Reply, Station
 from app.wire.profibus.decoder import ProfibusDecoder
 from app.wire.profibus.diagnosis import NO_MASTER, Diagnosis, Status
 from app.wire.profibus.dp import DataExchange, FdlStatus, Inputs, Refused, Service, ServiceAnswer, SetPrm, SlaveDiag
@@ -244,7 +244,7 @@ def test_bytes_of_others_are_no_pkw(decoder: ProfibusDecoder) -> None:
 def test_a_slave_from_the_first_probe_to_its_loss_and_back(decoder: ProfibusDecoder) -> None:
     line, waiting = Line(), Diagnosis(Status.PARAMETERS_REQUIRED | Status.ALWAYS, NO_MASTER, 0x0474)
     frames = [
-        *line.served(FdlStatus(), dp.StatusAnswer(dp.Station.SLAVE)),
+        *line.served(FdlStatus(), dp.StatusAnswer(Station.SLAVE)),
         *line.served(SlaveDiag(), dp.DiagnosisAnswer(waiting)),
         *line.served(SetPrm(0x0474), dp.Done()),
         *line.exchange(),
