@@ -21,6 +21,7 @@ from app.wire.memory import Cell, Reading, Stored
 from app.wire.nmt import ALL_NODES, NmtCommand, NmtState
 from app.wire.records import (
     BootUpSeen,
+    DiagnosisSeen,
     EmcySeen,
     EnvironmentSeen,
     GapSeen,
@@ -36,6 +37,8 @@ from app.wire.records import (
     SdoAccess,
     SdoSeen,
     Side,
+    SlaveSeen,
+    SlaveState,
     Source,
     StateSeen,
     SyncSeen,
@@ -110,6 +113,8 @@ class LiveState:
             TransactionSeen: self._on_transaction,
             RestartSeen: self._on_restart,
             MalformedAduSeen: self._on_malformed_adu,
+            SlaveSeen: self._on_slave,
+            DiagnosisSeen: self._on_diagnosis,
         }
 
     # -- writing -----------------------------------------------------------------
@@ -424,6 +429,15 @@ class LiveState:
         details = {"fault_key": seen.fault.text_key, "offset": seen.offset, "link": seen.link, "data": seen.data.hex()}
         told = Told(EventKind.MALFORMED, Severity.WARNING, "event.malformed_adu", details)
         self._add_event(seen.t_ns, seen.bus, seen.node, told)
+
+    def _on_slave(self, seen: SlaveSeen) -> None:
+        node = self._node(seen.bus, seen.node)
+        self._see(node)
+        node.silent = seen.state is SlaveState.ABSENT
+        self._touch_node(node)
+
+    def _on_diagnosis(self, seen: DiagnosisSeen) -> None:
+        self._see(self._node(seen.bus, seen.node))
 
     # -- bookkeeping -------------------------------------------------------------
 

@@ -98,7 +98,8 @@ export interface EntryDoc extends QuantityDoc {
   bits: string | null;
   restore: "copy" | "unit" | "factory" | "network" | "never";
   verify: "equal" | "ack" | "effect";
-  requires: { address: string; values: number[] }[];
+  /** `writing`: asked of writes of these raw values only; empty or missing for all. */
+  requires: { address: string; values: number[]; writing?: number[] }[];
   note: string | null;
   /** The save category that keeps it, where a device saves by categories. */
   save_category: string | null;

@@ -34,7 +34,10 @@ export function Facts({ row, onOpen }: Props) {
       "category",
       entry.save_category === null ? t("page.entry.any_category") : categoryName(entry.save_category, t),
     ]);
-  const needs = entry.requires.map(({ address, values }) => `${address} = ${values.map(String).join(", ")}`);
+  const needs = entry.requires.map(({ address, values, writing = [] }) => {
+    const need = `${address} = ${values.map(String).join(", ")}`;
+    return writing.length > 0 ? `${writing.map(String).join(", ")}: ${need}` : need;
+  });
   if (needs.length > 0) facts.push(["requires", needs.join("; ")]);
   return (
     <div className={classes.facts}>
