@@ -12,7 +12,8 @@ from app.errors import SiteError
 from app.model.description_file import load_builtin
 from app.model.site import Turbine, load_site
 from app.service.journal import Entry, Journal
-from app.service.site_edit import SiteEditor, changes_a_stop
+from app.service.site_check import changes_a_stop
+from app.service.site_edit import SiteEditor
 from app.service.sites import Sites
 from tests.e2e.processes import ROOT
 

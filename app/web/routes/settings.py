@@ -34,7 +34,8 @@ from app.service.bench import Bench
 from app.service.identify import Asked, ask_address
 from app.service.jobs import Job
 from app.service.polling import PollPlan, Rate, read_bits, usual_list
-from app.service.site_edit import changes_a_stop, propose, turbine_of
+from app.service.site_check import changes_a_stop
+from app.service.site_edit import propose, turbine_of
 from app.web.deps import BenchOf, JobsOf, JournalOf, Needs, PersonOf, needs
 from app.web.models.settings import (
     AboutDoc,
