@@ -51,9 +51,9 @@ def test_trace_and_plot_of_a_drive_on_modbus_tcp(home: Home) -> None:
     page.get_by_test_id("tab-load").click()
     expect(page.get_by_test_id("load-view")).to_contain_text("– kbit/s")
 
-    page.goto(f"{home.address}recordings?scene=off&replay={NAME}&at={at_ns}&plots=bench/servo/6064")
-    plot = page.get_by_test_id("plot-1")
-    expect(plot.get_by_test_id("line-bench/servo/6064")).to_be_visible(timeout=WAIT_MS)
+    page.goto(f"{home.address}recordings?scene=off&replay={NAME}&at={at_ns}&plots=bench/servo/6064&lang=en")
+    plot = page.get_by_role("region", name="Plot: Position Actual Value")
+    expect(plot).to_contain_text("684.0", timeout=WAIT_MS)  # ° where the blocked shaft stands, at the cursor
     page.close()
 
     code, series = home.call("GET", f"replay/{NAME}/series?signal=bench-pd4e/bench/servo/6064&points=400")
