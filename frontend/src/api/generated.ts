@@ -4606,10 +4606,13 @@ export interface components {
          * BusNode
          * @description One node that was seen, or that the site names. ``nmt`` is the text key of its state.
          *
-         *     ``device_name`` is what it said of itself (1008h). ``sdo_per_node`` counts transfers; ``other_client_t_ns`` is the
-         *     latest one that was not ours.
+         *     ``device_name`` is what it said of itself (1008h). Not ``managed``: its bus has neither states nor heartbeats; then
+         *     ``answered_t_ns``, its latest answer to anybody, tells that it is there. ``sdo_count`` counts transfers;
+         *     ``other_client_t_ns`` is the latest one that was not ours.
          */
         BusNode: {
+            /** Answered T Ns */
+            answered_t_ns: number | null;
             /** Boots */
             boots: number;
             /** Bus */
@@ -4632,6 +4635,8 @@ export interface components {
             heartbeat_t_ns: number | null;
             /** Load */
             load: number;
+            /** Managed */
+            managed: boolean;
             /** Nmt */
             nmt: string | null;
             /** Node */
