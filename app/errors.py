@@ -29,6 +29,7 @@
     │   ├── OvertakenError                  STOP or FEATHER came before the write left
     │   ├── MotionError                     the write could set an axis in motion
     │   ├── CommunicationError              the write changes PDOs, or is a save or load command
+    │   ├── AddressChangeError              the write changes where the device is found, and nobody has confirmed that
     │   ├── ConsentError                    active access needs consent (other master seen)
     │   ├── SettingsError                   a setting cannot be changed so, or not now
     │   ├── NotConnectedError               no turbine is connected
@@ -305,6 +306,15 @@ class CommunicationError(RefusedError):
     """The write changes PDOs or is a save or load command, and was not asked for as such. Details: address, name."""
 
     code = "communication"
+
+
+class AddressChangeError(RefusedError):
+    """The write changes at which address the device is found, and nobody has confirmed that.
+
+    Details: address, name, connected (where it is reached now, a dash where that is not known).
+    """
+
+    code = "address_change"
 
 
 class ConsentError(RefusedError):

@@ -74,8 +74,8 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    def stood() -> bool:
-        longest_s = config.stash[_WATCHER].longest_s()
+    def stood(error: BaseException | None) -> bool:
+        longest_s = 0.0 if error is None else config.stash[_WATCHER].longest_s()
         if longest_s:
             print(f"the machine stood still for {longest_s:.2f} s: once more", file=sys.stderr)
         return longest_s > 0

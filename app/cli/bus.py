@@ -12,15 +12,12 @@ from typing import Any
 
 from app.cli.arguments import seconds
 from app.cli.audited import audited
-from app.cli.connecting import connected, find_nodes, make_connection, named_turbine, run_command, sheets_of
+from app.cli.connecting import ask_peers, connected, find_nodes, make_connection, named_turbine, run_command, sheets_of
 from app.cli.output import Output
-from app.cli.targets import (
-    add_connection,
-    description_id,
-    find_device,
-)
+from app.cli.targets import add_connection, description_id, find_device
 from app.drivers.contract import FoundNode
-from app.errors import HubsideError, RecordingError, UnverifiedError
+from app.drivers.modbus_config import parse_modbus
+from app.errors import HubsideError, NoAnswerError, RecordingError, UnverifiedError
 from app.model.address import Address, parse_address
 from app.model.checks import Allow, check_read
 from app.model.datatypes import Raw
@@ -31,6 +28,7 @@ from app.model.values import show, to_scaled
 from app.service.backup import ReadReport, read_device, readable
 from app.service.connection import Connection
 from app.service.devices import Target
+from app.service.identify import Asked
 from app.service.save import restart, save
 from app.service.write import WriteResult, write_text
 
@@ -54,6 +52,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     write.add_argument("value", help="49.5, '49,5 °C', 0x1F, raw:495 or the name of an enumeration")
     write.add_argument("--factory", action="store_true", help="allow r(w) objects")
     write.add_argument("--motion", action="store_true", help="allow objects that can set an axis in motion (6040h)")
+    write.add_argument("--address-change", action="store_true", help="allow objects that decide the network address")
     write.add_argument("--communication", action="store_true", help="allow PDO parameters, save and load commands")
     write.add_argument("--save", action="store_true", help="then save to non-volatile memory")
     saving = command("save", _save, "save the parameters of a device to its non-volatile memory")
@@ -66,6 +65,8 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 
 async def _scan(arguments: argparse.Namespace, output: Output) -> int:
+    if arguments.modbus is not None:
+        return await _ask_addresses(arguments, output)
     started = time.monotonic()
     sheets = sheets_of(arguments, output)
     found = await find_nodes(arguments, output, sheets, await named_turbine(arguments, output))
@@ -73,23 +74,42 @@ async def _scan(arguments: argparse.Namespace, output: Output) -> int:
         output.result([_found_dict(node, description_id(sheets, node)) for node in found], "")
     elif found:
         head = ("NODE", "TYPE", "NAME", "HARDWARE", "SOFTWARE", "SERIAL", "DESCRIPTION")
-        output.table(head, [_found_row(node, description_id(sheets, node)) for node in found])
+        output.table(head, [_found_row(node, _serial(node), description_id(sheets, node)) for node in found])
     output.say("cli.found", count=len(found), took_s=f"{time.monotonic() - started:.1f}")
-    return 0 if found else 5
+    return 0 if found else NoAnswerError.exit_code
 
 
-def _found_row(node: FoundNode, description: str | None) -> tuple[str, ...]:
+async def _ask_addresses(arguments: argparse.Namespace, output: Output) -> int:
+    """Who is at each given address of Modbus TCP; of the others it is told why nobody is known to be there."""
+    started = time.monotonic()
+    asked = await ask_peers(parse_modbus(arguments.modbus), output)
+    for one in asked:
+        if one.error is not None:
+            output.error(one.error)
+    found = [(one, one.found) for one in asked if one.found is not None]
+    if output.as_json:
+        output.result([_asked_dict(one, node) for one, node in found], "")
+    elif found:
+        head = ("ADDRESS", "NODE", "TYPE", "NAME", "HARDWARE", "SOFTWARE", "SERIAL", "DESCRIPTION")
+        rows = [(one.peer.server, *_found_row(node, one.serial, node.description_id)) for one, node in found]
+        output.table(head, rows)
+    output.say("cli.found", count=len(found), took_s=f"{time.monotonic() - started:.1f}")
+    return 0 if found else NoAnswerError.exit_code
+
+
+def _asked_dict(one: Asked, node: FoundNode) -> dict[str, Any]:
+    known = {"address": one.peer.server, "variant": one.variant, "drive_serial": one.serial}
+    return {**_found_dict(node, node.description_id), **known}
+
+
+def _serial(node: FoundNode) -> str | None:
+    return None if node.identity.serial is None else str(node.identity.serial)
+
+
+def _found_row(node: FoundNode, serial: str | None, description: str | None) -> tuple[str, ...]:
     kind = "–" if node.device_type is None else f"{node.device_type:08X}h"
-    serial = "–" if node.identity.serial is None else str(node.identity.serial)
-    return (
-        str(node.node),
-        kind,
-        node.device_name or "–",
-        node.hardware or "–",
-        node.software or "–",
-        serial,
-        description or "–",
-    )
+    told = (node.device_name, node.hardware, node.software, serial, description)
+    return (str(node.node), kind, *(text or "–" for text in told))
 
 
 def _found_dict(node: FoundNode, description: str | None) -> dict[str, Any]:
@@ -208,6 +228,7 @@ async def _write(arguments: argparse.Namespace, output: Output) -> int:
 def _allowed(arguments: argparse.Namespace) -> Allow:
     allow = Allow.FACTORY if arguments.factory else Allow.NOTHING
     allow |= Allow.MOTION if arguments.motion else Allow.NOTHING
+    allow |= Allow.ADDRESS if arguments.address_change else Allow.NOTHING
     return allow | (Allow.COMMUNICATION if arguments.communication else Allow.NOTHING)
 
 

@@ -14,13 +14,26 @@ from typing import TYPE_CHECKING, Any
 
 from app.cli.output import Output, tell_warning
 from app.cli.runtime import spare_collector
-from app.cli.targets import Sheets, bare_turbine, descriptions_for, scanned_turbine, site_turbine
+from app.cli.targets import (
+    MODBUS_BUS,
+    Sheets,
+    bare_turbine,
+    descriptions_for,
+    is_bare,
+    modbus_turbine,
+    scanned_turbine,
+    site_turbine,
+)
 from app.drivers.contract import FoundNode
-from app.errors import NoAnswerError, UsageError
+from app.drivers.modbus_config import MAX_NODE, ModbusConfig, parse_modbus
+from app.errors import HubsideError, NoAnswerError, UsageError
 from app.model.address import is_decimal
+from app.model.description import Bus
+from app.model.description_file import BUILTIN, load_builtin
 from app.model.site import Turbine, load_site
 from app.service.bitrates import with_bitrate, with_bitrates
 from app.service.connection import Connection
+from app.service.identify import Asked, identify
 from app.service.options import Options
 from app.service.sites import Sites
 
@@ -66,7 +79,7 @@ async def connected(
 async def make_bench(arguments: argparse.Namespace, output: Output, record: bool) -> tuple[str | None, Bench]:
     """A bench that knows all turbines of the arguments, and the slug of the one to connect to.
 
-    Without ``--site`` and ``--can`` it knows those of the data folder's site file, and connects to one where only one
+    Where no bus is given it knows those of the data folder's site file, and connects to one where only one
     is named; what is connected, and to what, is chosen in the page then.
     """
     # Late: the other commands on a bus need neither bench nor store, and these take some time to load.
@@ -76,8 +89,8 @@ async def make_bench(arguments: argparse.Namespace, output: Output, record: bool
     store = Store.open(arguments.settings.data)  # first: nothing is sent where another process is at work already
     sheets = sheets_of(arguments, output)
     home: Path = arguments.settings.data / "site.toml"
-    if arguments.can is not None:
-        turbine = await _turbine_with_devices(arguments, output, sheets)
+    if is_bare(arguments):
+        turbine = await _turbine_with_devices(arguments, output, sheets, some=True)
         known, first = _only(turbine)
     else:
         known, first = _from_site_file(arguments, home)
@@ -104,16 +117,61 @@ def _from_site_file(arguments: argparse.Namespace, home: Path) -> tuple[tuple[Tu
     return known, site_turbine(arguments) if clear else None
 
 
-async def _turbine_with_devices(arguments: argparse.Namespace, output: Output, sheets: Sheets) -> Turbine:
-    """The turbine of the arguments; on a bare bus with the devices that a scan finds."""
+async def _turbine_with_devices(
+    arguments: argparse.Namespace, output: Output, sheets: Sheets, some: bool = False
+) -> Turbine:
+    """The turbine of the arguments; on a bare bus with the devices that a scan finds.
+
+    ``some``: addresses of Modbus TCP where nobody answers, or nobody whom we know, are told and left out.
+    """
+    nodes = _named_nodes(arguments)
+    if arguments.modbus is not None:
+        return await _modbus_turbine(parse_modbus(arguments.modbus), output, nodes, some)
     turbine = await named_turbine(arguments, output)
     if arguments.site is not None:
         return turbine
-    nodes = _named_nodes(arguments)
     found = await find_nodes(arguments, output, sheets, turbine, nodes)
     turbine = scanned_turbine(turbine.buses[0].connection, sheets, found)
     _all_there(nodes, found, turbine)
     return turbine
+
+
+async def _modbus_turbine(config: ModbusConfig, output: Output, nodes: list[int] | None, some: bool) -> Turbine:
+    """The devices at the given addresses; only ``nodes`` where given. Raises UsageError, NoAnswerError."""
+    places = {peer.node for peer in config.peers}
+    for node in nodes or ():
+        if node not in places:
+            there = ", ".join(f"{peer.node} ({peer.server})" for peer in config.peers)
+            raise UsageError(reason=f"no device '{node}'; there are: {there}")
+    config = ModbusConfig(tuple(peer for peer in config.peers if nodes is None or peer.node in nodes))
+    asked = await ask_peers(config, output)
+    for one in asked:
+        problem = one.error or _undescribed(one)
+        if problem is not None and not some:
+            raise problem
+        if problem is not None:
+            output.error(problem)
+    if all(one.found is None for one in asked):
+        raise _error_of(asked)
+    return modbus_turbine(config, [one.found for one in asked if one.found is not None])
+
+
+async def ask_peers(config: ModbusConfig, output: Output) -> list[Asked]:
+    """Who is at the addresses; what can be read there is told by the caller."""
+    output.say("cli.modbus.asking", addresses=", ".join(peer.server for peer in config.peers))
+    known = [description for description in map(load_builtin, BUILTIN) if description.bus is Bus.MODBUS_TCP]
+    return await identify(config, known, MODBUS_BUS)
+
+
+def _undescribed(one: Asked) -> UsageError | None:
+    if one.found is None or one.found.description_id is not None:
+        return None
+    name = one.found.device_name or "without a name"
+    return UsageError(reason=f"nothing describes the device at {one.peer.server} (node {one.peer.node}, {name})")
+
+
+def _error_of(asked: list[Asked]) -> HubsideError:
+    return next(one.error for one in asked if one.error is not None)
 
 
 async def named_turbine(arguments: argparse.Namespace, output: Output) -> Turbine:
@@ -121,6 +179,9 @@ async def named_turbine(arguments: argparse.Namespace, output: Output) -> Turbin
 
     Raises SiteError, UsageError, and what ``search_bitrate`` raises.
     """
+    if arguments.modbus is not None:
+        reason = "a recording of Modbus TCP holds what is asked here, and 'record' asks nothing: serve the page, "
+        raise UsageError(reason=reason + "or add --record to another command")
     turbine = site_turbine(arguments)
     if turbine is None:
         return bare_turbine(await with_bitrate(arguments.can, arguments.listen_s, _Telling(output)))
@@ -179,7 +240,11 @@ def _named_nodes(arguments: argparse.Namespace) -> list[int] | None:
     """The node numbers that the command names: nobody else need be asked. None where it names none."""
     named = getattr(arguments, "target", [])
     texts = [named] if isinstance(named, str) else named
-    return [int(text) for text in texts if is_decimal(text) and 1 <= int(text) <= 127] or None
+    return [
+        int(text)
+        for text in texts
+        if is_decimal(text) and 1 <= int(text) <= (127 if arguments.modbus is None else MAX_NODE)
+    ] or None
 
 
 async def find_nodes(

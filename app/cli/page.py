@@ -13,7 +13,7 @@ from app.errors import UsageError
 from app.scene.hub import HubScene
 from app.service.bench import Bench
 from app.web.access import Access
-from app.web.app import create_app
+from app.web.app import create_app, warm_up
 from app.web.listen import Listen, Tls, parse_listen
 from app.web.serve import open_port, port_of, serve
 
@@ -34,6 +34,7 @@ async def serve_page(arguments: argparse.Namespace, bench: Bench) -> AsyncIterat
     scene = await asyncio.to_thread(HubScene, secrets.token_urlsafe(32))
     try:
         application = create_app(bench, access, at, scene, arguments.settings.language, reach=reach)
+        await asyncio.to_thread(warm_up, application)
         async with serve(application, listener, listen.tls):
             query = {} if sessions.login_needed else {"token": access.issue_token()}
             first = next(iter(bench.options.more_recordings), None)

@@ -19,7 +19,7 @@ from app.cli.output import Output
 from app.cli.restore_kept import give_up, list_restores
 from app.cli.restore_record import check_target, earlier_record, try_record
 from app.cli.restore_told import Told
-from app.cli.targets import add_connection
+from app.cli.targets import add_connection, is_connected
 from app.errors import RestoreRefusedError, RestoreStateError, SetFileError, UsageError
 from app.model.address import parse_address
 from app.model.sets import ParameterSet, load_set
@@ -108,8 +108,8 @@ def _check(arguments: argparse.Namespace) -> None:
             )
     elif not arguments.set:
         raise UsageError(reason="name the sets to restore: files, or ids of the library")
-    if not alone and arguments.can is None and arguments.site is None:
-        raise UsageError(reason="name the bus: --site FILE or --can INTERFACE:CHANNEL")
+    if not alone and not is_connected(arguments):
+        raise UsageError(reason="name the bus: --site FILE, --can INTERFACE:CHANNEL or --modbus HOST:PORT")
     _check_terms(arguments)
 
 

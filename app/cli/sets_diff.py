@@ -13,7 +13,7 @@ from typing import Final
 from app.cli.compared import compared_json, matters, tell_text
 from app.cli.connecting import connected, run_command, sheets_of
 from app.cli.output import Output
-from app.cli.targets import add_connection, descriptions_for
+from app.cli.targets import add_connection, descriptions_for, is_connected
 from app.cli.users import opened
 from app.errors import UsageError
 from app.model.sets import ParameterSet
@@ -52,8 +52,8 @@ def add_actions(actions: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         description=(
             "A COLUMN is a set file, or one of file:PATH, set:ID, live:TARGET, stored:TARGET, default:DEVICE, "
             "golden:DEVICE, delivered:DEVICE, found:DEVICE, left:DEVICE, year:DEVICE. TARGET is TURBINE/STATION/DEVICE "
-            "or a node number, and needs --site or --can. Exit code 0 where nothing differs but what is bound to the "
-            "unit, 1 where something does."
+            "or a node number, and needs --site, --can or --modbus. Exit code 0 where nothing differs but what "
+            "is bound to the unit, 1 where something does."
         ),
     )
     diff.add_argument("columns", nargs="+", metavar="COLUMN")
@@ -97,8 +97,8 @@ async def _ground(
         library, visits = await stack.enter_async_context(kept(arguments))
         ground = replace(ground, library=library, visits=visits)
     if any(one.kind in _BUS for one in specs):
-        if arguments.site is None and arguments.can is None:
-            raise UsageError(reason="live and stored columns need a connection (--site or --can)")
+        if not is_connected(arguments):
+            raise UsageError(reason="live and stored columns need a connection (--site, --can or --modbus)")
         arguments.target = [one.of for one in specs if one.kind in _BUS]
         connection = await stack.enter_async_context(connected(arguments, output))
         specs = [_by_slug(one, connection) for one in specs]

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from app.cli.connecting import connected, run_command
 from app.cli.output import Output
-from app.cli.targets import add_connection
+from app.cli.targets import add_connection, is_connected
 from app.errors import RefusedError, SetFileError, UsageError
 from app.model.description import Description
 from app.model.description_file import BUILTIN, load_builtin
@@ -68,9 +68,9 @@ def _rule_row(rule: Rule, output: Output) -> tuple[str, ...]:
 
 
 def _check(arguments: argparse.Namespace, output: Output) -> int:
-    live = arguments.site is not None or arguments.can is not None
+    live = is_connected(arguments)
     if live == bool(arguments.files):
-        raise UsageError(reason="name set files to check, or a connection (--site or --can)")
+        raise UsageError(reason="name set files to check, or a connection (--site, --can or --modbus)")
     if live:
         return run_command(_check_connected(arguments, output))
     return _tell(check_sets([_read(path) for path in arguments.files]), output)

@@ -3,28 +3,37 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 
 from app.cli.arguments import seconds
 from app.drivers.contract import FoundNode
+from app.drivers.modbus_config import ModbusConfig
 from app.errors import UsageError
 from app.model.address import is_decimal
 from app.model.description import Description
 from app.model.description_file import BUILTIN, load_builtin
 from app.model.eds import EdsWarning, load_eds
+from app.model.servers import MODBUS, Server
 from app.model.site import BusConfig, Device, Station, Turbine, load_site
+from app.service.gate import BARE_TURBINE
 
 BUS = "can0"
+MODBUS_BUS = "modbus0"
 SHEET_SUFFIXES = (".eds", ".dcf")
 
 
 def add_connection(parser: argparse.ArgumentParser, required: bool = True) -> None:
-    """``--site`` or ``--can``, and how the connection is made."""
+    """``--site``, ``--can`` or ``--modbus``, and how the connection is made."""
     where = parser.add_mutually_exclusive_group(required=required)
     where.add_argument("--site", type=Path, help="site file that names turbines, stations and devices")
     where.add_argument(
         "--can", metavar="INTERFACE:CHANNEL[@BITRATE]", help="socketcan:can0@500000, slcan:COM3@search …"
+    )
+    where.add_argument(
+        "--modbus",
+        metavar="HOST[:PORT][/UNIT][=NODE][,…]",
+        help="devices of Modbus TCP; only these addresses are asked: 192.168.2.20, 192.168.2.21=2 …",
     )
     parser.add_argument("--turbine", help="which turbine of the site file, where it names several")
     parser.add_argument(
@@ -100,9 +109,32 @@ def descriptions_for(sheets: Sheets, turbine: Turbine, site: Path | None) -> dic
     return known
 
 
+def is_bare(arguments: argparse.Namespace) -> bool:
+    """Whether the bus itself is given, and no site file."""
+    return arguments.can is not None or arguments.modbus is not None
+
+
+def is_connected(arguments: argparse.Namespace) -> bool:
+    """Whether the arguments name a bus at all."""
+    return arguments.site is not None or is_bare(arguments)
+
+
 def bare_turbine(connection: str) -> Turbine:
-    """A turbine of one bus and no known device yet."""
-    return Turbine("bus", connection, (BusConfig(BUS, connection, 0),), ())
+    """A turbine of one CAN bus and no known device yet."""
+    return Turbine(BARE_TURBINE, connection, (BusConfig(BUS, connection, 0),), ())
+
+
+def modbus_turbine(config: ModbusConfig, found: Iterable[FoundNode]) -> Turbine:
+    """The turbine of the devices at given addresses, as far as they were recognised."""
+    peers = {peer.node: peer for peer in config.peers}
+    devices = tuple(
+        _bare_device(one.node, one.description_id, MODBUS_BUS, str(Server(*peers[one.node][1:])))
+        for one in found
+        if one.description_id is not None
+    )
+    ranges = tuple(dict.fromkeys(peer.server for peer in config.peers))
+    name = ", ".join(ranges)
+    return Turbine(BARE_TURBINE, name, (BusConfig(MODBUS_BUS, MODBUS, 0, ranges=ranges),), _bare_stations(devices))
 
 
 def description_id(sheets: Sheets, found: FoundNode) -> str | None:
@@ -113,12 +145,16 @@ def description_id(sheets: Sheets, found: FoundNode) -> str | None:
 def scanned_turbine(connection: str, sheets: Sheets, found: list[FoundNode]) -> Turbine:
     """The turbine of one bus with the devices that a scan has recognised, or that an EDS was given for."""
     described = [(one.node, description_id(sheets, one)) for one in found]
-    devices = tuple(
-        Device(f"bus/nodes/{node}", f"node {node}", description, BUS, node)
-        for node, description in described
-        if description is not None
-    )
-    return Turbine("bus", connection, (BusConfig(BUS, connection, 0),), (Station("bus/nodes", "nodes", None, devices),))
+    devices = tuple(_bare_device(node, description, BUS) for node, description in described if description is not None)
+    return Turbine(BARE_TURBINE, connection, (BusConfig(BUS, connection, 0),), _bare_stations(devices))
+
+
+def _bare_device(node: int, description: str, bus: str, address: str = "") -> Device:
+    return Device(f"{BARE_TURBINE}/nodes/{node}", f"node {node}", description, bus, node, address)
+
+
+def _bare_stations(devices: tuple[Device, ...]) -> tuple[Station, ...]:
+    return (Station(f"{BARE_TURBINE}/nodes", "nodes", None, devices),)
 
 
 def find_device(turbine: Turbine, target: str) -> Device:

@@ -6,10 +6,18 @@ from decimal import Decimal
 from enum import Flag, auto
 from typing import Final
 
-from app.errors import AccessError, CommunicationError, LimitError, MotionError, PreconditionError, ValueTypeError
+from app.errors import (
+    AccessError,
+    AddressChangeError,
+    CommunicationError,
+    LimitError,
+    MotionError,
+    PreconditionError,
+    ValueTypeError,
+)
 from app.model.address import Addressing
 from app.model.datatypes import Raw, encode_raw
-from app.model.description import Access, Description, Entry, Limit, LimitRef, Lookup
+from app.model.description import Access, Description, Entry, Limit, LimitRef, Lookup, RestoreClass
 from app.model.values import quantity_of, show
 
 STORE_PARAMETERS: Final = 0x1010
@@ -26,6 +34,8 @@ class Allow(Flag):
     """Write objects that can set an axis in motion."""
     COMMUNICATION = auto()
     """Change PDOs (14xxh to 1Axxh), or write save and load commands as if they were values."""
+    ADDRESS = auto()
+    """Change at which address the device is found: a person has confirmed that the connection will be lost."""
 
 
 def check_read(entry: Entry) -> None:
@@ -46,8 +56,8 @@ def check_write(
     """Check everything that can be known before a write; gives the bytes to send.
 
     ``lookup`` knows other objects of the device; a limit that rests on an unknown object is left to the device.
-    ``allow`` says what is permitted beyond ordinary parameters. Raises AccessError, MotionError, ValueTypeError,
-    LimitError or PreconditionError.
+    ``allow`` says what is permitted beyond ordinary parameters. Raises AccessError, MotionError, CommunicationError,
+    AddressChangeError, ValueTypeError, LimitError or PreconditionError.
     """
     if not (entry.access.writable or (Allow.FACTORY in allow and entry.access is Access.FACTORY)):
         raise AccessError(address=entry.address.short, name=entry.title, access=entry.access.value)
@@ -55,12 +65,15 @@ def check_write(
         raise MotionError(address=entry.address.short, name=entry.title)
     if _is_communication(description, entry) and Allow.COMMUNICATION not in allow:
         raise CommunicationError(address=entry.address.short, name=entry.title)
+    if entry.restore is RestoreClass.NETWORK and Allow.ADDRESS not in allow:
+        raise AddressChangeError(address=entry.address.short, name=entry.title, connected="–")
     data = _encode(entry, raw)
     if isinstance(raw, int | float):
         _check_limits(entry, raw, lookup, variant)
-        _check_enumeration(description, entry, raw)
+        _check_steps(entry, raw)
+        _check_enumeration(description, entry, raw, lookup)
     for condition in entry.requires:
-        found = lookup(condition.address)
+        found = lookup(condition.address) if condition.concerns(raw) else None
         if found is not None and found not in condition.values:
             raise PreconditionError(
                 address=entry.address.short,
@@ -83,13 +96,22 @@ def _is_communication(description: Description, entry: Entry) -> bool:
 def limits_of(entry: Entry, lookup: Lookup, variant: str | None = None) -> tuple[Decimal | None, Decimal | None]:
     """Raw limits in force, those of the data type included; None where there is none or it is not known."""
     own = entry.variants.get(variant) if variant is not None else None
-    low = _resolve(own.minimum if own and own.minimum is not None else entry.minimum, lookup)
-    high = _resolve(own.maximum if own and own.maximum is not None else entry.maximum, lookup)
+    lowest, highest = _ruled(entry, lookup)
+    low = _resolve(own.minimum if own and own.minimum is not None else lowest, lookup)
+    high = _resolve(own.maximum if own and own.maximum is not None else highest, lookup)
     span = entry.type.range
     if span is not None:
         low = Decimal(span[0]) if low is None else max(low, Decimal(span[0]))
         high = Decimal(span[1]) if high is None else min(high, Decimal(span[1]))
     return low, high
+
+
+def _ruled(entry: Entry, lookup: Lookup) -> tuple[Limit | None, Limit | None]:
+    """The entry's limits, or those that its rule gives."""
+    otherwise = (entry.minimum, entry.maximum)
+    rule = entry.limits_rule
+    found = None if rule is None else lookup(rule.address)
+    return otherwise if rule is None or not isinstance(found, int) else rule.choices.get(found, otherwise)
 
 
 def _resolve(limit: Limit | None, lookup: Lookup) -> Decimal | None:
@@ -136,15 +158,21 @@ def _limit_error(
     )
 
 
-def _check_enumeration(description: Description, entry: Entry, raw: int | float) -> None:
-    if entry.enumeration is None:
-        return
-    enumeration = description.enumerations[entry.enumeration]
-    if enumeration.exclusive and all(value.value != raw for value in enumeration.values):
-        raise ValueTypeError(
-            address=entry.address.short,
-            name=entry.title,
-            type=entry.type.name,
-            value=str(raw),
-            reason="not one of: " + ", ".join(f"{value.value} {value.name}" for value in enumeration.values),
-        )
+def _check_steps(entry: Entry, raw: int | float) -> None:
+    if entry.only and raw not in entry.only:
+        raise _misfit(entry, raw, f"not one of: {', '.join(map(str, entry.only))}")
+    if entry.step > 1 and raw % entry.step:
+        raise _misfit(entry, raw, f"no multiple of {entry.step}")
+
+
+def _check_enumeration(description: Description, entry: Entry, raw: int | float, lookup: Lookup) -> None:
+    enumeration = description.enumeration_of(entry, lookup)
+    if enumeration is not None and enumeration.exclusive and all(value.value != raw for value in enumeration.values):
+        names = ", ".join(f"{value.value} {value.name}" for value in enumeration.values)
+        raise _misfit(entry, raw, f"not one of: {names}")
+
+
+def _misfit(entry: Entry, raw: int | float, reason: str) -> ValueTypeError:
+    return ValueTypeError(
+        address=entry.address.short, name=entry.title, type=entry.type.name, value=str(raw), reason=reason
+    )

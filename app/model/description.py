@@ -139,10 +139,34 @@ Limit = int | Decimal | LimitRef
 
 @dataclass(frozen=True, slots=True)
 class Condition:
-    """A write is allowed only while the object at ``address`` holds one of ``values``."""
+    """A write is allowed only while the object at ``address`` holds one of ``values``.
+
+    Where ``writing`` is not empty, this is asked of writes of these raw values only.
+    """
 
     address: Address
     values: tuple[int, ...]
+    writing: tuple[int, ...] = ()
+
+    def concerns(self, raw: Raw) -> bool:
+        """True where a write of ``raw`` depends on it."""
+        return not self.writing or raw in self.writing
+
+
+@dataclass(frozen=True, slots=True)
+class TableRule:
+    """A table of bits or of names that depends on the raw value of ``address``: the id of one for each."""
+
+    address: Address
+    choices: Mapping[int, str]
+
+
+@dataclass(frozen=True, slots=True)
+class LimitsRule:
+    """Limits that depend on the raw value of ``address``: the lowest and the highest raw value for each."""
+
+    address: Address
+    choices: Mapping[int, tuple[Limit | None, Limit | None]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -259,6 +283,11 @@ class Entry:
     can set an axis in motion; ``counts`` one that the device itself counts on, so that no old value is put back. An
     emergency feather command puts the value of ``overwritten_by`` into it, in RAM. ``line`` is the row's line in its
     file.
+
+    ``enumeration_rule``, ``bits_rule`` and ``limits_rule`` replace ``enumeration``, ``bits`` and the limits while the
+    object that they name is known. A raw value is a multiple of ``step``, or one of ``only`` where that is not empty.
+    ``signals`` are the numbers that a telegram of process data knows it by, and ``tool_name`` the name that the maker's
+    own tool gives it.
     """
 
     address: Address
@@ -296,6 +325,13 @@ class Entry:
     motion: bool = False
     counts: bool = False
     overwritten_by: Address | None = None
+    enumeration_rule: TableRule | None = None
+    bits_rule: TableRule | None = None
+    limits_rule: LimitsRule | None = None
+    step: int = 1
+    only: tuple[int, ...] = ()
+    signals: tuple[int, ...] = ()
+    tool_name: str | None = None
     pdo_way: PdoWay = PdoWay.BOTH
     line: int = 0
 
@@ -404,6 +440,16 @@ class Description:
         named = self.enumerations[entry.enumeration].by_value(raw)
         return None if named is None else named.text_key
 
+    def enumeration_of(self, entry: Entry, lookup: Lookup) -> Enumeration | None:
+        """The names of values in force; where they depend on an object that is not known, those of all cases."""
+        name = _chosen(entry.enumeration_rule, lookup, entry.enumeration)
+        return None if name is None else self.enumerations[name]
+
+    def bits_of(self, entry: Entry, lookup: Lookup) -> BitTable | None:
+        """The names of bits in force; where they depend on an object that is not known, those of all cases."""
+        name = _chosen(entry.bits_rule, lookup, entry.bits)
+        return None if name is None else self.bit_tables[name]
+
     def has_index(self, index: int) -> bool:
         """True where any sub-index of ``index`` exists."""
         return index in self._indices
@@ -421,6 +467,11 @@ class Description:
                 cached.setdefault(entry.address.major, []).append(entry)
             object.__setattr__(self, "_by_index", cached)
         return cached
+
+
+def _chosen(rule: TableRule | None, lookup: Lookup, otherwise: str | None) -> str | None:
+    found = None if rule is None else lookup(rule.address)
+    return rule.choices.get(found, otherwise) if rule is not None and isinstance(found, int) else otherwise
 
 
 SAVE_SIGNATURE: Final = 0x65766173

@@ -33,6 +33,7 @@ from app.model.description import (
     Kind,
     Limit,
     LimitRef,
+    LimitsRule,
     Match,
     Mirror,
     PdoSide,
@@ -41,6 +42,7 @@ from app.model.description import (
     RestoreClass,
     SaveCommand,
     Source,
+    TableRule,
     Variant,
     VariantValues,
     Verify,
@@ -64,7 +66,7 @@ _OWN_KEYS: Final = frozenset(("index", "ind", "pnu", "kind", "subs", "elements")
 _ROW_KEYS: Final = frozenset(
     "name section group type access pdo default saved save_category unit scale hex unit_from min max enumeration bits "
     "restore verify requires mirror by_variant note inferred origin timeout_s node_id motion also counts "
-    "overwritten_by".split()
+    "overwritten_by enumeration_from bits_from limits_from step only signals tool_name".split()
 )
 _NOT_INHERITED_BY_SUB0: Final = _ROW_KEYS - {"section", "group", "saved", "save_category", "inferred", "origin"}
 _PDO_SIDES: Final = frozenset(side.value for side in PdoSide)
@@ -262,7 +264,8 @@ class _Reader:
             verify=_enum(Verify, row.get("verify", "equal"), "verify"),
             save_category=row.get("save_category"),
             requires=tuple(
-                Condition(parse_address(one["address"]), tuple(one["values"])) for one in row.get("requires", ())
+                Condition(parse_address(one["address"]), tuple(one["values"]), tuple(one.get("writing", ())))
+                for one in row.get("requires", ())
             ),
             mirror=_mirror(row.get("mirror")),
             variants={name: _variant(values) for name, values in row.get("by_variant", {}).items()},
@@ -277,6 +280,13 @@ class _Reader:
             motion=_bool(row, "motion"),
             counts=_bool(row, "counts"),
             overwritten_by=parse_address(row["overwritten_by"]) if "overwritten_by" in row else None,
+            enumeration_rule=_table_rule(row.get("enumeration_from")),
+            bits_rule=_table_rule(row.get("bits_from")),
+            limits_rule=_limits_rule(row.get("limits_from")),
+            step=_step(row),
+            only=tuple(row.get("only", ())),
+            signals=tuple(row.get("signals", ())),
+            tool_name=_text(row, "tool_name") if "tool_name" in row else None,
             line=line,
         )
 
@@ -312,6 +322,12 @@ def _contradictions(description: Description, entry: Entry) -> Iterator[str]:
         yield f"bit table '{entry.bits}' does not exist"
     if entry.enumeration is not None and entry.enumeration not in description.enumerations:
         yield f"enumeration '{entry.enumeration}' does not exist"
+    for table in () if entry.enumeration_rule is None else entry.enumeration_rule.choices.values():
+        if table not in description.enumerations:
+            yield f"enumeration '{table}' does not exist"
+    for table in () if entry.bits_rule is None else entry.bits_rule.choices.values():
+        if table not in description.bit_tables:
+            yield f"bit table '{table}' does not exist"
     if entry.group not in description.groups:
         yield f"group '{entry.group}' does not exist"
     if entry.origin is not None and entry.origin not in description.sources:
@@ -335,7 +351,11 @@ def _contradictions(description: Description, entry: Entry) -> Iterator[str]:
 
 
 def _misfits(entry: Entry) -> Iterator[str]:
-    """Defaults of variants that their type cannot hold."""
+    """Defaults of variants that their type cannot hold, and defaults that are none of the values allowed."""
+    if isinstance(entry.default, int) and (
+        entry.default % entry.step or (entry.only and entry.default not in entry.only)
+    ):
+        yield f"default {entry.default} is none of the values that step and only allow"
     for variant, values in entry.variants.items():
         if values.default is not None:
             try:
@@ -352,6 +372,13 @@ def _references(entry: Entry) -> Iterator[tuple[str, Address]]:
     for what, limit in (("min", entry.minimum), ("max", entry.maximum)):
         if isinstance(limit, LimitRef):
             yield what, limit.address
+    for key, rule in (
+        ("enumeration_from", entry.enumeration_rule),
+        ("bits_from", entry.bits_rule),
+        ("limits_from", entry.limits_rule),
+    ):
+        if rule is not None:
+            yield key, rule.address
     for condition in entry.requires:
         yield "requires", condition.address
     if entry.mirror is not None:
@@ -453,6 +480,30 @@ def _quantity_rule(row: Mapping[str, Any] | None) -> QuantityRule | None:
     choices = {int(value, 0): _quantity(choice) for value, choice in row.get("choices", {}).items()}
     shaft = row.get("shaft")
     return QuantityRule(parse_address(row["address"]), choices, None if shaft is None else parse_address(shaft))
+
+
+def _table_rule(row: Mapping[str, Any] | None) -> TableRule | None:
+    if row is None:
+        return None
+    choices = {int(value, 0): str(table) for value, table in row["choices"].items()}
+    return TableRule(parse_address(row["address"]), choices)
+
+
+def _limits_rule(row: Mapping[str, Any] | None) -> LimitsRule | None:
+    if row is None:
+        return None
+    choices = {
+        int(value, 0): (_limit(limits.get("min")), _limit(limits.get("max")))
+        for value, limits in row["choices"].items()
+    }
+    return LimitsRule(parse_address(row["address"]), choices)
+
+
+def _step(row: Mapping[str, Any]) -> int:
+    step = _int(row, "step") if "step" in row else 1
+    if step < 1:
+        raise _WrongError(f"step is {step}, not 1 or more")
+    return step
 
 
 def _limit(value: Any) -> Limit | None:

@@ -14,15 +14,19 @@ from app.model.datatypes import Raw
 from app.model.description import (
     Access,
     BitTable,
+    Condition,
     Description,
     Entry,
     Enumeration,
     ErrorCode,
     Limit,
     LimitRef,
+    LimitsRule,
     Quantity,
     QuantityRule,
     SaveCommand,
+    TableRule,
+    Variant,
     VariantValues,
 )
 from app.model.texts import load_texts
@@ -120,6 +124,7 @@ def description_dict(description: Description) -> dict[str, Any]:
         },
         "variants": list(description.variants),
         "variant_names": {one.id: one.name for one in description.variant_details.values()},
+        "variant_matches": [_variant_match(one) for one in description.variant_details.values()],
         "sources": {source.id: source.title for source in description.sources.values()},
         "groups": [{"id": group, "text_key": f"group.{group}"} for group in description.groups],
         "bit_tables": {name: _bit_table(table) for name, table in description.bit_tables.items()},
@@ -169,7 +174,7 @@ def entry_dict(entry: Entry) -> dict[str, Any]:
         "bits": entry.bits,
         "restore": entry.restore.value,
         "verify": entry.verify.value,
-        "requires": [{"address": one.address.short, "values": list(one.values)} for one in entry.requires],
+        "requires": [_condition(one) for one in entry.requires],
         "mirror": {"of": entry.mirror.of.short, "divisor": entry.mirror.divisor} if entry.mirror else None,
         "by_variant": {name: _variant(values) for name, values in entry.variants.items()},
         "note": entry.note,
@@ -179,7 +184,44 @@ def entry_dict(entry: Entry) -> dict[str, Any]:
         "motion": entry.motion,
         "timeout_s": entry.timeout_s,
         "hexadecimal": entry.hexadecimal,
+        "enumeration_from": _table_rule(entry.enumeration_rule),
+        "bits_from": _table_rule(entry.bits_rule),
+        "limits_from": _limits_rule(entry.limits_rule),
+        "step": entry.step,
+        "only": list(entry.only),
+        "signals": list(entry.signals),
+        "tool_name": entry.tool_name,
     }
+
+
+def _variant_match(variant: Variant) -> dict[str, Any]:
+    """By what a device says of itself it is known to be this one."""
+    match = variant.match
+    named = {"id": variant.id, "name": variant.name}
+    return named | {"device_name": match.device_name, "product_code": match.product_code}
+
+
+def _condition(condition: Condition) -> dict[str, Any]:
+    return {
+        "address": condition.address.short,
+        "values": list(condition.values),
+        "writing": list(condition.writing),
+    }
+
+
+def _table_rule(rule: TableRule | None) -> dict[str, Any] | None:
+    if rule is None:
+        return None
+    return {"address": rule.address.short, "choices": {str(value): name for value, name in rule.choices.items()}}
+
+
+def _limits_rule(rule: LimitsRule | None) -> dict[str, Any] | None:
+    if rule is None:
+        return None
+    choices = {
+        str(value): {"minimum": _limit(low), "maximum": _limit(high)} for value, (low, high) in rule.choices.items()
+    }
+    return {"address": rule.address.short, "choices": choices}
 
 
 def _bit_table(table: BitTable) -> list[dict[str, Any]]:

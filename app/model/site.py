@@ -16,6 +16,8 @@ from app.model.servers import MODBUS, Server, parse_range, parse_server
 SCHEMA: Final = 1
 HEARTBEAT_NODE: Final = 126
 """Seldom given to a device, and not the last one, which some tools take for themselves."""
+MAX_NODE: Final[Mapping[Bus, int]] = {Bus.CANOPEN: 127, Bus.MODBUS_TCP: 247}
+"""The highest number of a device (CiA 301; Modbus over serial line, 2.2)."""
 _SLUG: Final = re.compile(r"^[a-z0-9]+(-[a-z0-9]+)*$")
 
 
@@ -203,11 +205,11 @@ class _Reader:
 
     def _device(self, slug: str, table: Mapping[str, Any], where: str, buses: tuple[BusConfig, ...]) -> Device:
         self._known(table, "name description bus node address external_stop", where)
-        node = self._node(table, "node", where, None)
         bus = str(table.get("bus", buses[0].name if buses else ""))
         config = next((one for one in buses if one.name == bus), None)
         if config is None:
             raise self._wrong(f"{where}bus", f"bus '{bus}' is not named in this turbine")
+        node = self._node(table, "node", where, None, MAX_NODE[config.kind])
         name = str(table.get("name", slug.rsplit("/", 1)[1].upper()))
         description = self._text(table, "description", where)
         stop = self._text(table, "external_stop", where) if "external_stop" in table else ""
@@ -237,10 +239,12 @@ class _Reader:
             raise self._wrong(f"{where}{key}", "is missing or no text")
         return value
 
-    def _node(self, table: Mapping[str, Any], key: str, where: str, default: int | None) -> int:
+    def _node(
+        self, table: Mapping[str, Any], key: str, where: str, default: int | None, most: int = MAX_NODE[Bus.CANOPEN]
+    ) -> int:
         node = self._int(table, key, where, default)
-        if not 1 <= node <= 127:
-            raise self._wrong(f"{where}{key}", f"is {node}, not 1 to 127")
+        if not 1 <= node <= most:
+            raise self._wrong(f"{where}{key}", f"is {node}, not 1 to {most}")
         return node
 
     def _int(self, table: Mapping[str, Any], key: str, where: str, default: int | None) -> int:

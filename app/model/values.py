@@ -145,7 +145,7 @@ def _misfit(entry: Entry, text: str, reason: str) -> ValueTypeError:
 
 
 def depends_on(entry: Entry) -> Iterator[Address]:
-    """Addresses of the objects that unit, limits and preconditions of ``entry`` rest on."""
+    """Addresses of the objects that unit, limits, tables and preconditions of ``entry`` rest on."""
     if entry.quantity_rule is not None:
         yield entry.quantity_rule.address
         if entry.quantity_rule.shaft is not None:
@@ -153,5 +153,8 @@ def depends_on(entry: Entry) -> Iterator[Address]:
     for limit in (entry.minimum, entry.maximum):
         if isinstance(limit, LimitRef):
             yield limit.address
+    for rule in (entry.limits_rule, entry.enumeration_rule, entry.bits_rule):
+        if rule is not None:
+            yield rule.address
     for condition in entry.requires:
         yield condition.address

@@ -349,6 +349,21 @@ class Recording:
             and (buses is None or self.channels[place.channel_id].topic[1:] in buses)
         ]
 
+    def telegram_chunks(self, buses: Collection[str] | None = None) -> list[ChunkPlace]:
+        """The chunks of telegrams of ``buses`` (None: all) by time; none of files of others."""
+        return [
+            place
+            for place in self._chunks
+            if not self.foreign
+            and place.channel_id != ANY_CHANNEL
+            and self._may_hold(place, TELEGRAM.name)
+            and (buses is None or self.channels[place.channel_id].topic[1:] in buses)
+        ]
+
+    def telegrams(self, place: ChunkPlace) -> list[Frame]:
+        """Those of a chunk of telegrams. Raises ``ValueError`` where it is damaged."""
+        return [frame for _, frame in self._frames_of(place)]
+
     def unpacked(self, place: ChunkPlace) -> bytes:
         """The uncompressed records of a chunk. Raises ``ValueError`` where it is damaged."""
         return chunk_data(self.chunk(place))

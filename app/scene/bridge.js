@@ -202,8 +202,8 @@
     if (!seen) return;
     const focal = innerHeight / 2 / tan(seen.fov);
     const back = inverse(seen.wxyz);
-    const places = SCENE.places.map(({ id, position, normal }) => {
-      const point = turned(rotor, position);
+    const places = SCENE.places.map(({ id, position, normal, fixed }) => {
+      const point = fixed ? position : turned(rotor, position);
       const away = minus(point, seen.position);
       const [x, y, depth] = turned(back, away);
       const faces = normal === null || dot(turned(rotor, normal), away) < 0;

@@ -10,6 +10,7 @@ from typing import Final, NamedTuple
 
 from app.scene.blade import TIP_M
 from app.scene.marks import COLLAR_M
+from app.scene.shaft import PLACE_M
 from app.scene.solids import Vector
 
 
@@ -46,7 +47,11 @@ def _about_shaft(point: Vector, turn_rad: float) -> Vector:
     return (x, y * cos - z * sin, y * sin + z * cos)
 
 
-CAMERAS: Final = (FRONT, HUB, *(_blade_camera(blade) for blade in (1, 2, 3)))
+_X, _Y, _Z = PLACE_M
+BENCH: Final = Camera("shaft", (_X + 6.2, _Y - 3.6, _Z + 2.2), (_X - 0.3, _Y, _Z + 0.1), (1.45, 1.35))
+"""The axis on a bench: from before its shaft, a little aside, so that gear and motor are seen behind it."""
+
+CAMERAS: Final = (FRONT, HUB, *(_blade_camera(blade) for blade in (1, 2, 3)), BENCH)
 
 
 def fov_rad(camera: Camera, aspect: float) -> float:

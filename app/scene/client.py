@@ -11,6 +11,7 @@ from app.scene.blade import ROOT_M, TIP_M
 from app.scene.cameras import CAMERAS, Camera
 from app.scene.hub import BLADES, NOSE, ROTOR, demand_node, selected_node
 from app.scene.marks import NAMED_DEG, direction, label_place
+from app.scene.shaft import LABEL_M, MOST, place_of
 from app.scene.solids import Vector, rotation
 
 _HERE: Final = Path(__file__).parent
@@ -41,7 +42,7 @@ def scene_facts() -> dict[str, Any]:
         "nose": NOSE,
         "cameras": [_camera(camera) for camera in CAMERAS],
         "blades": blades,
-        "places": [place for blade in BLADES for place in _places(blade)],
+        "places": [*(place for blade in BLADES for place in _places(blade)), *map(_shaft_place, range(1, MOST + 1))],
     }
 
 
@@ -54,6 +55,12 @@ def _camera(camera: Camera) -> dict[str, Any]:
         "nose_off": camera.nose_off,
         "blade": camera.blade,
     }
+
+
+def _shaft_place(number: int) -> dict[str, Any]:
+    """Where the label of an axis on the bench belongs: it does not turn with the rotor."""
+    position = [round(one + more, 4) for one, more in zip(place_of(number), LABEL_M, strict=True)]
+    return {"id": f"shaft-{number}", "position": position, "normal": None, "fixed": True}
 
 
 def _places(blade: int) -> list[dict[str, Any]]:

@@ -1,4 +1,4 @@
-"""The rotor as a scene: the latest angles of the live state, coloured by state, on a turning hub.
+"""The rotor as a scene: the latest angles of the live state, coloured by state, on a turning hub; or a bench's shafts.
 
 Only what was seen on the wire moves anything; what is stale or unknown is shown as such (grey, seen through), never
 guessed. The scene is one for all viewers; what differs between them (camera, selection, nose, ghosts) each view sets
@@ -7,7 +7,7 @@ for itself by the nodes named here (``app.scene.client``).
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final
 
 import viser
@@ -15,11 +15,12 @@ import viser
 from app.scene import machinery, marks
 from app.scene.blade import PITCH_AXIS, ROOT_M, TIP_M, blade_mesh, root_radius_m
 from app.scene.cameras import FRONT, fov_rad
-from app.scene.look import UNKNOWN_BLADE, UNKNOWN_ROTOR, BladePose, BladeState, Rgb, RotorPose
+from app.scene.look import UNKNOWN_BLADE, UNKNOWN_ROTOR, BladePose, BladeState, Rgb, RotorPose, ShaftPose
 from app.scene.server import start_server
+from app.scene.shaft import Shafts
 from app.scene.solids import Mesh, quaternion, torus
 
-__all__ = ["BLADES", "BladePose", "BladeState", "HubScene", "RotorPose"]
+__all__ = ["BLADES", "BladePose", "BladeState", "HubScene", "RotorPose", "ShaftPose"]
 
 BLADES: Final = (1, 2, 3)
 ROTOR: Final = "/rotor"
@@ -135,8 +136,11 @@ class HubScene:
         self._rotor = scene.add_frame(ROTOR, show_axes=False)
         _add(scene, f"{ROTOR}/casting", machinery.casting(), _CAST)
         _add(scene, NOSE, machinery.nose(), _WHITE)
-        _add(scene, "/nacelle", machinery.nacelle(), _GROUND)
-        _add(scene, "/tower", machinery.tower(_TOWER_M), _GROUND)
+        nacelle = _add(scene, "/nacelle", machinery.nacelle(), _GROUND)
+        tower = _add(scene, "/tower", machinery.tower(_TOWER_M), _GROUND)
+        self._turbine = (self._rotor, nacelle, tower)
+        self._has_rotor = True
+        self._shafts = Shafts(scene)
         self._wind = scene.add_frame("/wind", position=_WIND_AT_M, show_axes=False, visible=False)
         self._arrow = _add(scene, "/wind/arrow", machinery.arrow().moved((-1.0, 0.0, 0.0)), _WIND)
         self._blades = {blade: _Blade(scene, blade) for blade in BLADES}
@@ -161,6 +165,15 @@ class HubScene:
                     self._shown[blade] = pose
                     self._blades[blade].show(pose, before)
 
+    def show_shafts(self, poses: Sequence[ShaftPose], has_rotor: bool) -> None:
+        """Turn and colour the axes that have no blade. Without ``has_rotor`` there is none: a bench is all there is."""
+        with self._server.atomic():
+            self._shafts.show(poses)
+            if has_rotor is not self._has_rotor:
+                self._has_rotor = has_rotor
+                for one in self._turbine:
+                    one.visible = has_rotor
+
     def show_rotor(self, pose: RotorPose) -> None:
         """Turn the rotor and the wind's arrow; what did not change is not sent."""
         before, self._rotor_shown = self._rotor_shown, pose
@@ -181,6 +194,7 @@ class HubScene:
         """Show nothing as known, so that who looks next sees nothing that is over."""
         self.show(dict.fromkeys(BLADES, UNKNOWN_BLADE))
         self.show_rotor(UNKNOWN_ROTOR)
+        self.show_shafts((), True)
 
     def played(self, stills: Iterable[tuple[Mapping[int, BladePose], RotorPose, float]]) -> str:
         """A page that shows ``stills``, each so many seconds long, over and over; what this one shows is its beginning.

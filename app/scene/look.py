@@ -70,6 +70,20 @@ DEMAND_REACHED_DEG: Final = 0.3
 
 
 @dataclass(frozen=True, slots=True)
+class ShaftPose:
+    """What is shown of an axis without a blade. ``shaft_deg`` None: no angle was ever seen.
+
+    ``motor_deg`` is the angle of the motor before the gear, None where the gear is not known. ``turns``: 1 positive,
+    -1 negative, 0 where it stands or nobody knows.
+    """
+
+    shaft_deg: float | None
+    motor_deg: float | None
+    state: BladeState
+    turns: int = 0
+
+
+@dataclass(frozen=True, slots=True)
 class RotorPose:
     """Rotor and wind. None: not known; a rotor of unknown azimuth stands with blade 1 upwards.
 

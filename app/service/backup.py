@@ -86,16 +86,19 @@ async def read_devices(
 def to_set(
     report: ReadReport, turbine: str, person: str, reason: str, wall_ns: int, work_order: str = ""
 ) -> ParameterSet:
-    """The parameter set of a complete read."""
+    """The parameter set of a complete read. Of what is changed for motion it holds what stands there otherwise."""
     target = report.target
+    axes = target.gate.claims.axes
+    before = {} if axes is None else axes.before(target.slug)
+    values = {**report.values, **{at: decode(target.entry(at), was) for at, was in before.items()}}
     time = iso_time(wall_ns // SECOND_NS * SECOND_NS)
     return ParameterSet(
         description_id=target.description.id,
         description_version=target.description.version,
-        identity=identity_of(report.values),
+        identity=identity_of(values),
         origin=Origin(turbine, target.slug, target.node, time, person, reason, f"hubside {__version__}", work_order),
-        values=report.values,
-        unread={address: why(error) for address, error in report.failed.items() if not is_empty(error)},
+        values=values,
+        unread={at: why(error) for at, error in report.failed.items() if not is_empty(error) and at not in before},
         empty=tuple(address for address, error in report.failed.items() if is_empty(error)),
     )
 

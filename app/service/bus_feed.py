@@ -16,17 +16,12 @@ from app.wire.decoder import CanOpenDecoder
 from app.wire.decoders import BusDecoder, decoder_of
 from app.wire.frame import Adu, Can, Frame
 from app.wire.live import LiveState
+from app.wire.modbus.adu import ETHERNET_BPS, wire_bits
 from app.wire.modbus.decoder import ModbusDecoder
 from app.wire.pdo_follower import PdoRoute
 from app.wire.records import Record
 
 GAP_REASON: Final = GAP_REASONS[EventKind.BUS_LOST]
-
-
-ETHERNET_BPS: Final = 100_000_000
-"""What the load of a Modbus TCP bus is a share of: the port of the drives (fast Ethernet)."""
-_TCP_OCTETS: Final = 14 + 20 + 20 + 24
-"""What carries an ADU: Ethernet, IP and TCP headers, check, preamble and gap."""
 
 
 class BusFeed:
@@ -51,7 +46,7 @@ class BusFeed:
         self._can = self.decoder if isinstance(self.decoder, CanOpenDecoder) else None
         self._modbus = self.decoder if isinstance(self.decoder, ModbusDecoder) else None
         self.load = BusLoad(bitrate if self._modbus is None else ETHERNET_BPS)
-        self.trace = BusTrace(name, self._can or CanOpenDecoder(name), lock)
+        self.trace = BusTrace(name, self.decoder, lock, servers)
         self.frames = 0
         self._live = live
         self._lock = lock
@@ -71,13 +66,12 @@ class BusFeed:
             if self._modbus is not None:
                 for frame in frames:
                     if isinstance(frame.payload, Adu):
-                        bits = 8 * (len(frame.payload.data) + _TCP_OCTETS)
-                        count(frame.t_ns, bits, self._modbus.node_of(frame))
+                        count(frame.t_ns, wire_bits(len(frame.payload.data)), self._modbus.node_of(frame))
             else:
                 for t_ns, _, _, can, _ in frames:
                     if type(can) is Can:
                         count(t_ns, frame_bits(can), can.can_id, can.extended)
-                self.trace.take(frames)
+            self.trace.take(frames)
             records = self.decoder.feed_all(frames)
             if records:
                 self.trace.heard(records)
@@ -87,8 +81,7 @@ class BusFeed:
     def gap(self, t_ns: int, reason: str = GAP_REASON) -> None:
         """Frames are missing before ``t_ns``: what was read until then proves nothing any more."""
         with self._lock:
-            if self._can is not None:
-                self.trace.gap(t_ns, reason)
+            self.trace.gap(t_ns, reason)
             records = self.decoder.gap(t_ns, reason)
             self.trace.heard(records)
             self._missed(records)

@@ -123,6 +123,11 @@ class BusLink(BusFeed):
         """Another master is at work, and nobody has consented to active access yet."""
         return bool(getattr(self.driver, "needs_consent", False))  # TCP shows no other master
 
+    @property
+    def has_pdos(self) -> bool:
+        """Commands go at once by PDO there, and devices can watch our heartbeat: CAN. Else they are written."""
+        return self.kind is Bus.CANOPEN
+
     def send_pdo(self, node: int, address: Address, data: bytes) -> bool:
         """Send ``data`` by the receive PDO of ``node`` that carries ``address`` and nothing else, and works at once.
 
@@ -131,7 +136,7 @@ class BusLink(BusFeed):
         Raises BusLostError.
         """
         view = self._live.node(self.name, node)
-        if self.kind is not Bus.CANOPEN or view is None or view.state is not NmtState.OPERATIONAL or view.silent:
+        if not self.has_pdos or view is None or view.state is not NmtState.OPERATIONAL or view.silent:
             return False
         for route in self.pdos(node):
             entries = route.mapping.entries

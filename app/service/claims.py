@@ -5,6 +5,9 @@ while one is, nothing else is written, saved or restarted (``service.gate``). A 
 keep these two away. A single write, a save or a restart holds no claim: it only asks whether somebody has the device
 for himself. STOP, FEATHER and reading never ask. Claims are taken and given back in the event loop without waiting in
 between, so that of two that begin at once one is refused before it has sent anything.
+
+Axes are held by their desk (``Axes``): while one is under way nothing of its device is written, saved or restarted by
+anybody else; while it is prepared it is neither saved nor restarted, and what it rests on is not written.
 """
 
 from __future__ import annotations
@@ -13,8 +16,10 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import Enum
+from typing import Protocol
 
 from app.errors import DeviceBusyError
+from app.model.address import Address
 
 
 class Work(Enum):
@@ -24,6 +29,7 @@ class Work(Enum):
     RESTORE = "restore"
     WRITES = "writes"
     BATTERY = "battery"
+    MOTION = "motion"
 
     @property
     def alone(self) -> bool:
@@ -49,11 +55,22 @@ class Claim:
         return DeviceBusyError(device=device, work_key=self.work.text_key, person=self.person)
 
 
+class Axes(Protocol):
+    """What the desk of a connection keeps others from."""
+
+    def keeper(self, device: str, address: Address | None) -> str | None:
+        """Who keeps the device from being saved or restarted (None), or an object of it from being written."""
+
+    def before(self, device: str) -> dict[Address, bytes]:
+        """What objects held that are changed for motion."""
+
+
 class Claims:
-    """The claims on the devices of one connection. Belongs to the event loop."""
+    """The claims on the devices of one connection. Belongs to the event loop. ``axes``: its desk, where it has one."""
 
     def __init__(self) -> None:
         self._now: list[Claim] = []
+        self.axes: Axes | None = None
 
     @contextmanager
     def held(self, work: Work, person: str, devices: Iterable[str]) -> Iterator[None]:
@@ -63,14 +80,30 @@ class Claims:
             if work.alone or other.work.alone:
                 for device in sorted(claim.devices & other.devices):
                     raise other.refusal(device)
+        if work.alone:
+            for device in sorted(claim.devices):
+                self._require_no_motion(device, None)
         self._now.append(claim)
         try:
             yield
         finally:
             self._now.remove(claim)
 
-    def require_free(self, device: str) -> None:
-        """Raises DeviceBusyError where somebody has the device for himself."""
+    def require_free(self, device: str, address: Address | None = None) -> None:
+        """Raises DeviceBusyError where somebody has the device for himself, or moves it.
+
+        ``address`` is about to be written; None: the device is about to be saved or restarted.
+        """
+        self.require_unclaimed(device)
+        self._require_no_motion(device, address)
+
+    def require_unclaimed(self, device: str) -> None:
+        """Raises DeviceBusyError where somebody has the device for himself; whether it moves is not asked."""
         for claim in self._now:
             if claim.work.alone and device in claim.devices:
                 raise claim.refusal(device)
+
+    def _require_no_motion(self, device: str, address: Address | None) -> None:
+        person = None if self.axes is None else self.axes.keeper(device, address)
+        if person is not None:
+            raise DeviceBusyError(device=device, work_key=Work.MOTION.text_key, person=person)

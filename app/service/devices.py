@@ -46,12 +46,13 @@ class Target:
             return None
         return decode(entry, view.reading.data)
 
-    async def pass_gate(self, driver: Driver) -> None:
+    async def pass_gate(self, driver: Driver, address: Address | None = None) -> None:
         """Raises RestoreOpenError where a restore of the device is not finished, DeviceBusyError where it is in use.
 
-        Its identity is read for that where nobody has seen it yet. Raises NoAnswerError, BusLostError, ConsentError.
+        ``address`` is about to be written; None: the device is about to be saved or restarted. Its identity is read
+        for that where nobody has seen it yet. Raises NoAnswerError, BusLostError, ConsentError.
         """
-        await self.gate.check(self.device, lambda: self._identity(driver))
+        await self.gate.check(self.device, lambda: self._identity(driver), address)
 
     async def require_no_restore(self, driver: Driver) -> None:
         """As ``pass_gate``, for who has claimed the device."""
@@ -60,6 +61,10 @@ class Target:
     def past_gate(self) -> Target:
         """The same device for who has it for himself: nothing keeps him from ending what he began."""
         return replace(self, gate=OPEN)
+
+    def past_claims(self) -> Target:
+        """The same device for who moves it: only a restore that is not finished keeps him from it."""
+        return replace(self, gate=self.gate.past_claims())
 
     async def _identity(self, driver: Driver) -> Identity:
         """What the device says of itself. Raises NoAnswerError."""

@@ -14,6 +14,7 @@ from typing import Final
 
 from app.drivers.can_config import parse_can
 from app.errors import RestoreOpenError, UsageError
+from app.model.address import Address
 from app.model.sets import Identity
 from app.model.site import Device
 from app.model.station import station_slug
@@ -86,13 +87,20 @@ class Gate:
         self.blocks = blocks
         self.claims = Claims()
 
-    async def check(self, device: Device, ask: Callable[[], Awaitable[Identity]]) -> None:
+    def past_claims(self) -> Gate:
+        """A gate that only restores shut: for who has the device, or moves it."""
+        return Gate(self._connections, self.blocks)
+
+    async def check(
+        self, device: Device, ask: Callable[[], Awaitable[Identity]], address: Address | None = None
+    ) -> None:
         """Raises RestoreOpenError, DeviceBusyError. ``ask`` reads what the device says of itself.
 
-        It is asked only where some restore is open and no name decides.
+        It is asked only where some restore is open and no name decides. ``address`` is about to be written; None: the
+        device is about to be saved or restarted.
         """
         await self.check_restores(device, ask)
-        self.claims.require_free(device.slug)  # at last: what is asked takes its time
+        self.claims.require_free(device.slug, address)  # at last: what is asked takes its time
 
     async def check_restores(self, device: Device, ask: Callable[[], Awaitable[Identity]]) -> None:
         """As ``check``, for who has the device: raises RestoreOpenError where a restore of it is open."""

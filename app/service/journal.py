@@ -51,12 +51,16 @@ class Kind(Enum):
     LEASE_TAKEN = "lease_taken"
     LEASE_ENDED = "lease_ended"
     MOTION_PREPARED = "motion_prepared"
+    MOTION_UNWATCHED = "motion_unwatched"
+    EXTERNAL_STOP = "external_stop"
+    MOTION_LOST = "motion_lost"
     MOTION_PUT_BACK = "motion_put_back"
     MOTION_BEGUN = "motion_begun"
     MOTION_ENDED = "motion_ended"
     MOTION_STOPPED = "motion_stopped"
     FAULT_RESET = "fault_reset"
     HOMED = "homed"
+    HOME_FOUND = "home_found"
     INCIDENT_MADE = "incident_made"
     SCOPE_ARMED = "scope_armed"
     SCOPE_CAPTURED = "scope_captured"
@@ -75,6 +79,7 @@ class Kind(Enum):
     BATTERY_TEST_BEGUN = "battery_test_begun"
     BATTERY_TEST_ENDED = "battery_test_ended"
     BATTERY_CHANGED = "battery_changed"
+    VERIFIED = "verified"
 
     @property
     def severity(self) -> Severity:
@@ -91,6 +96,7 @@ class Kind(Enum):
 
 _ERRORS: Final = (
     Kind.BUS_LOST,
+    Kind.MOTION_LOST,
     Kind.WRITE_FAILED,
     Kind.SAVE_REFUSED,
     Kind.SAVE_NOT_PROVEN,
@@ -102,6 +108,8 @@ _ERRORS: Final = (
 _WARNINGS: Final = (
     Kind.MOTION_STOPPED,
     Kind.MOTION_BEGUN,
+    Kind.MOTION_UNWATCHED,
+    Kind.EXTERNAL_STOP,
     Kind.NMT_SENT,
     Kind.RESTORE_BEGUN,
     Kind.RESTORE_TURNED_BACK,
@@ -126,10 +134,13 @@ _DONE: Final = (
     Kind.NMT_SENT,
     Kind.LEASE_TAKEN,
     Kind.MOTION_PREPARED,
+    Kind.MOTION_UNWATCHED,
+    Kind.EXTERNAL_STOP,
     Kind.MOTION_PUT_BACK,
     Kind.MOTION_BEGUN,
     Kind.FAULT_RESET,
     Kind.HOMED,
+    Kind.HOME_FOUND,
     Kind.INCIDENT_MADE,
     Kind.SCOPE_ARMED,
     Kind.RESTORE_BEGUN,
@@ -159,6 +170,7 @@ _DONE: Final = (
     Kind.SCENARIO_STOPPED,
     Kind.BATTERY_TEST_BEGUN,
     Kind.BATTERY_CHANGED,
+    Kind.VERIFIED,
 )
 
 

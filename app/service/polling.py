@@ -55,6 +55,15 @@ RARE: Final = tuple(
     )
 )
 
+CURRENT: Final = parse_address("6078")
+TORQUE: Final = parse_address("6077")
+"""What stands in for the current on a drive that gives none (CiA 402, torque actual value)."""
+CONDITIONS: Final = tuple(map(parse_address, ("4014:01", "4014:03", "4014:04")))
+"""Supply and temperatures of a drive that has no objects of the profile for them."""
+SI_UNIT: Final = parse_address("60A8")
+UNITS: Final = tuple(map(parse_address, ("60A8", "60A9", "6091:01", "6091:02", "6092:01", "6092:02")))
+"""Where a device chooses its units, no value says anything without these: they must be known again after a restart."""
+
 
 class Rate(Enum):
     """How often an object is read: in every round, in every n-th, in every m-th."""
@@ -75,7 +84,12 @@ _USUAL: Final[PollList] = {
 
 def usual_list(description: Description) -> PollList:
     """What the screens need of a device, as far as it has it."""
-    return {address: rate for address, rate in _USUAL.items() if address in description.entries}
+    wanted = dict(_USUAL)
+    if CURRENT not in description.entries:
+        wanted |= dict.fromkeys((TORQUE, *CONDITIONS), Rate.SLOW)
+    if SI_UNIT in description.entries:
+        wanted |= dict.fromkeys(UNITS, Rate.RARE)
+    return {address: rate for address, rate in wanted.items() if address in description.entries}
 
 
 @dataclass(frozen=True, slots=True)

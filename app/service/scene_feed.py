@@ -8,8 +8,9 @@ import logging
 from collections.abc import AsyncIterator
 from typing import Final
 
-from app.scene.hub import BLADES, BladePose, BladeState, HubScene, RotorPose
+from app.scene.hub import BLADES, BladePose, BladeState, HubScene, RotorPose, ShaftPose
 from app.service.rotor_view import NOBODY, RotorLine, rotor_line
+from app.service.shaft_view import ShaftLine, shaft_lines
 from app.service.shown import Shown
 from app.service.views import AxisLine, axis_lines
 
@@ -27,6 +28,11 @@ _LOOK_AGAIN_S: Final = 0.25
 def pose(line: AxisLine) -> BladePose:
     """How a blade looks: its last angle, coloured by its state; grey where that is unknown or old."""
     return BladePose(line.position_deg, BladeState(line.look), line.demand_deg)
+
+
+def shaft_pose(line: ShaftLine) -> ShaftPose:
+    """How an axis without a blade looks: its last angle, coloured as a blade would be."""
+    return ShaftPose(line.shaft_deg, line.motor_deg, BladeState(line.look), line.turns)
 
 
 def rotor_pose(line: RotorLine) -> RotorPose:
@@ -94,13 +100,18 @@ class SceneFeed:
     def _show(self) -> None:
         """All now; nothing is known of what is not connected."""
         poses, rotor = dict.fromkeys(BLADES, BladePose(None, BladeState.UNKNOWN)), NOBODY
+        shafts: list[ShaftPose] = []
+        has_rotor = True
         stage = self._source.stage
         if stage is not None:
             now_ns = self._source.now_ns()
             targets = {target.slug: target for target in stage.targets}
             poses |= {line.blade: pose(line) for line in axis_lines(stage.turbine, targets, now_ns)}
             rotor = rotor_line(stage.live, now_ns)
+            shafts = [shaft_pose(line) for line in shaft_lines(stage.turbine, targets, now_ns)]
+            has_rotor = not shafts or any(station.blade is not None for station in stage.turbine.stations)
         self._scene.show(poses)
+        self._scene.show_shafts(shafts, has_rotor)
         self._show_rotor(rotor_pose(rotor))
 
     def _show_rotor(self, pose: RotorPose) -> None:

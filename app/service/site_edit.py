@@ -12,18 +12,18 @@ import hashlib
 import os
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
-from app.drivers.can_config import parse_can
 from app.drivers.contract import FoundNode
-from app.errors import SettingsError, SiteError, UsageError
-from app.model.description import Bus, Description
+from app.errors import SettingsError, SiteError
+from app.model.description import Bus
 from app.model.description_file import BUILTIN
 from app.model.site import BusConfig, Device, Station, Turbine, read_site
 from app.service.journal import Journal, Kind
 from app.service.polling import changes_text
+from app.service.site_check import check_kinds, check_turbine
 from app.service.sites import Sites
 
 _BLADES: Final = (1, 2, 3)
@@ -31,7 +31,6 @@ _BLADE_NODES: Final[Mapping[str, int]] = {"oat-pmm": 0, "oat-pmc": 10}
 """Node of blade 0 by description: the devices of blade n stand at this plus n."""
 _SHORT: Final[Mapping[str, str]] = {"oat-pmm": "pmm", "oat-pmc": "pmc"}
 _BENCH: Final = "bench"
-_TEXT_MAX: Final = 100
 _UNFIT: Final = re.compile(r"[^\w-]+", re.ASCII)
 
 
@@ -148,6 +147,7 @@ class SiteEditor:
         from app.model.site_write import with_turbine
 
         path = self._writable()
+        check_kinds(turbine, str(path))
         text = with_turbine(self._begun(), turbine, str(path))
         check_turbine(turbine, self._sites.describe, str(path))
         await self._write(path, text)
@@ -190,47 +190,6 @@ def _same_slugs(before: Turbine, after: Turbine) -> None:
             raise SettingsError(reason_key="settings.refused.slug_permanent", slug=device.slug, now=now)
 
 
-def check_turbine(turbine: Turbine, describe: Any, file: str) -> None:
-    """What a reader of site files cannot know: adapters, descriptions, names. Raises SiteError with the key."""
-    where = f"turbine.{turbine.slug}."
-    _name(turbine.name, f"{where}name", file)
-    if not turbine.buses:
-        raise SiteError(file=file, key=f"{where}bus", reason="no bus is named")
-    for bus in turbine.buses:
-        _adapter(bus, f"{where}bus.{bus.name}.", file)
-    known: Mapping[str, Description] = describe(turbine)
-    for station in turbine.stations:
-        at = f"{where}station.{station.slug.split('/', 1)[1]}."
-        _name(station.name, f"{at}name", file)
-        for device in station.devices:
-            own = f"{at}device.{device.slug.rsplit('/', 1)[1]}."
-            _name(device.name, f"{own}name", file)
-            description = known.get(device.description_id)
-            if description is None:
-                reason = f"there is no description '{device.description_id}' (there are: {', '.join(sorted(known))})"
-                raise SiteError(file=file, key=f"{own}description", reason=reason)
-            if description.bus is not Bus.CANOPEN:
-                reason = f"{description.id} is no device of a CAN bus"
-                raise SiteError(file=file, key=f"{own}description", reason=reason)
-
-
-def _name(name: str, key: str, file: str) -> None:
-    if not name.strip() or len(name) > _TEXT_MAX or not name.isprintable():
-        raise SiteError(file=file, key=key, reason=f"a name has 1 to {_TEXT_MAX} printable characters")
-
-
-def _adapter(bus: BusConfig, where: str, file: str) -> None:
-    with_rate = "@" in bus.connection or not bus.bitrate
-    try:
-        parse_can(bus.connection)
-    except UsageError as error:
-        raise SiteError(file=file, key=f"{where}connection", reason=error.details["reason"]) from error
-    try:
-        parse_can(bus.connection if with_rate else f"{bus.connection}@{bus.bitrate}")
-    except UsageError as error:
-        raise SiteError(file=file, key=f"{where}bitrate", reason=error.details["reason"]) from error
-
-
 # -- what changed -----------------------------------------------------------------------
 
 
@@ -256,12 +215,20 @@ def _document(turbine: Turbine | None) -> dict[str, Any]:
         }
         for station in turbine.stations
     }
-    buses = {bus.name: f"{bus.connection}@{bus.bitrate}" for bus in turbine.buses}
+    buses = {bus.name: _bus_text(bus) for bus in turbine.buses}
     return {"name": turbine.name, "bus": buses, "station": stations}
 
 
+def _bus_text(bus: BusConfig) -> str:
+    if bus.kind is Bus.MODBUS_TCP:
+        return f"{bus.connection} {', '.join(bus.ranges)}"
+    return f"{bus.connection}@{bus.bitrate}"
+
+
 def _device_text(device: Device) -> str:
-    return f"{device.name}, {device.description_id}, {device.bus} node {device.node}"
+    text = f"{device.name}, {device.description_id}, {device.bus} node {device.node}"
+    address = f" at {device.address}" if device.address else ""
+    return text + address + (f", stopped by {device.external_stop}" if device.external_stop else "")
 
 
 # -- found devices ------------------------------------------------------------------------
@@ -295,9 +262,7 @@ def turbine_of(
             f"{slug}/{at}",
             title,
             blade,
-            tuple(
-                Device(f"{slug}/{at}/{one.slug}", one.name, one.description_id, one.bus, one.node) for one in devices
-            ),
+            tuple(replace(one, slug=f"{slug}/{at}/{one.slug}") for one in devices),
         )
         for at, title, blade, devices in stations
     )

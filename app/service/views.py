@@ -13,7 +13,7 @@ from app.errors import ValueTypeError
 from app.model.address import Address
 from app.model.axis_state import AxisState
 from app.model.datatypes import DataType, Raw
-from app.model.description import Entry
+from app.model.description import Bus, Entry
 from app.model.site import Station, Turbine
 from app.model.values import to_scaled
 from app.service.devices import Target, decode
@@ -71,7 +71,11 @@ _COMPLAINTS: Final = ((STATUSWORD, 1 << 7, 1 << 3), (Address(0x3000), 1 << 1, 1 
 
 @dataclass(frozen=True, slots=True)
 class NodeLine:
-    """One device as network management sees it. ``silent``: its heartbeat is overdue, so its state is unknown."""
+    """One device as network management sees it. ``silent``: its heartbeat is overdue, so its state is unknown.
+
+    Not ``managed``: its bus has neither states nor heartbeats; then ``answered_t_ns``, the latest answer that it gave
+    to anybody, tells that it is there.
+    """
 
     device: str
     node: int
@@ -80,6 +84,8 @@ class NodeLine:
     heartbeat_t_ns: int | None
     heartbeat_period_ms: float | None
     boots: int
+    managed: bool
+    answered_t_ns: int | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,12 +174,28 @@ def node_lines(targets: Iterable[Target], live: LiveState) -> tuple[NodeLine, ..
     return tuple(_node_line(target, live.node(target.device.bus, target.node)) for target in targets)
 
 
+def is_managed(target: Target) -> bool:
+    """True where its bus has network management: states, heartbeats, boot-up messages."""
+    return target.description.bus is not Bus.MODBUS_TCP
+
+
 def _node_line(target: Target, view: NodeView | None) -> NodeLine:
+    managed = is_managed(target)
     if view is None:
-        return NodeLine(target.slug, target.node, "unknown", False, None, None, 0)
+        return NodeLine(target.slug, target.node, "unknown", False, None, None, 0, managed, None)
     nmt: NmtName = "unknown" if view.state is None or view.silent else _NMT[view.state]
     period_ms = None if view.period_ns is None else round(view.period_ns / 1e6, 1)
-    return NodeLine(target.slug, target.node, nmt, view.silent, view.heartbeat_ns, period_ms, view.boots)
+    return NodeLine(
+        device=target.slug,
+        node=target.node,
+        nmt=nmt,
+        silent=view.silent,
+        heartbeat_t_ns=view.heartbeat_ns,
+        heartbeat_period_ms=period_ms,
+        boots=view.boots,
+        managed=managed,
+        answered_t_ns=None if managed else view.answered_ns,
+    )
 
 
 def nodes_urgent(lines: Iterable[NodeLine]) -> tuple[Any, ...]:
@@ -213,7 +235,7 @@ def axis_lines(turbine: Turbine, targets: Mapping[str, Target], now_ns: int) -> 
 def _axis_line(station: Station, blade: int, devices: list[Target], now_ns: int) -> AxisLine:
     position = _latest(devices, _POSITION)
     state = next((axis_state(raw) for raw in _lookups(devices, STATUSWORD) if isinstance(raw, int)), None)
-    faults, code = _faults(devices)
+    faults, code = fault_lines(devices)
     stale = position is None or position.stale or now_ns - position.t_ns > STALE_NS
     return AxisLine(
         station=station.slug,
@@ -232,11 +254,12 @@ def _axis_line(station: Station, blade: int, devices: list[Target], now_ns: int)
         battery_v=_number(_latest(devices, _BATTERY)),
         dc_link_v=_number(_latest(devices, _DC_LINK)),
         stale=stale,
-        look="unknown" if position is None else "stale" if stale else _look(state, faults),
+        look="unknown" if position is None else "stale" if stale else look_of(state, faults),
     )
 
 
-def _look(state: str | None, faults: Iterable[FaultLine]) -> LookName:
+def look_of(state: str | None, faults: Iterable[FaultLine]) -> LookName:
+    """What a picture of an axis shows that is known and not old, the worst first."""
     severities = {fault.severity for fault in faults}
     if state in _FAULT or "error" in severities:
         return "fault"
@@ -288,7 +311,7 @@ def _number(seen: _Seen | None) -> float | None:
     return None if seen is None else seen.number
 
 
-def _faults(devices: Iterable[Target]) -> tuple[tuple[FaultLine, ...], int | None]:
+def fault_lines(devices: Iterable[Target]) -> tuple[tuple[FaultLine, ...], int | None]:
     """What the devices complain of, errors first, and the code of the worst; 0: nothing, None: not known."""
     known: int | None = None
     found = []

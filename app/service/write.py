@@ -20,6 +20,7 @@ from app.model.checks import Allow, check_write
 from app.model.datatypes import Raw, encode_raw
 from app.model.description import Entry, Verify
 from app.model.values import depends_on, parse, show
+from app.service.address_change import require_confirmed
 from app.service.devices import Target, decode
 from app.service.journal import Journal, Kind
 
@@ -72,12 +73,13 @@ async def write_raw(
     ``expected`` is what the change was made from; where RAM holds another value, nothing is written (ConflictError).
     ``known``: urgent commands to the object when the write was decided on (``Driver.commanded``), by default those
     there are now; where another one comes before it leaves, nothing is written (OvertakenError).
-    Raises RefusedError (nothing was sent), DeviceError (the device refused), NoAnswerError, or UnverifiedError (sent,
-    but another value was read back, or none).
+    Raises RefusedError (nothing was sent; AddressChangeError: it needs a confirmation), DeviceError (the device
+    refused), NoAnswerError, or UnverifiedError (sent, but another value was read back, or none).
     """
     known = driver.commanded(target.node, address) if known is None else known
     entry = target.entry(address)
-    await target.pass_gate(driver)
+    require_confirmed(target, entry, allow)
+    await target.pass_gate(driver, address)
     await know_what_it_rests_on(driver, target, entry)
     data = await _checked(driver, target, entry, raw, allow)
     was = decode(entry, await driver.read(target.node, address, entry.timeout_s)) if entry.access.readable else None
@@ -89,7 +91,7 @@ async def write_raw(
             found=_shown(target, entry, was),
         )
     shown = {"address": address.short, "name": entry.title, "was": _shown(target, entry, was)}
-    await target.pass_gate(driver)  # once more: what was read meanwhile took its time
+    await target.pass_gate(driver, address)  # once more: what was read meanwhile took its time
     try:
         how = await driver.write(target.node, address, data, entry.timeout_s, entry.verify, known=known)
         read = await _read_back(driver, target, entry, data)

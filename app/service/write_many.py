@@ -30,6 +30,7 @@ from app.model.datatypes import Raw
 from app.model.description import Verify
 from app.model.saving import saves_for
 from app.model.station import Place, station_slug
+from app.service.address_change import require_confirmed
 from app.service.claims import Work
 from app.service.devices import Target
 from app.service.jobs import Job, JobRow, RowState
@@ -222,7 +223,8 @@ async def _check_all(rows: Sequence[Row], allow: Allow) -> None:
             return target.lookup(address) if found is None else found
 
         try:
-            await target.pass_gate(change.driver)
+            await target.pass_gate(change.driver, change.address)
+            require_confirmed(target, target.entry(change.address), allow)
             check_write(target.description, target.entry(change.address), change.raw, lookup, allow=allow)
         except HubsideError as error:
             row.state, row.error = RowState.REFUSED, error

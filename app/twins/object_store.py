@@ -170,7 +170,7 @@ class ObjectStore:
     def assign(self, cell: Cell, raw: Raw) -> Deferred | None:
         """Write a value with all checks but those of access (a PDO is checked when it is mapped)."""
         for condition in cell.entry.requires:
-            if self.at(condition.address).now not in condition.values:
+            if condition.concerns(raw) and self.at(condition.address).now not in condition.values:
                 raise RefusedAccessError(Abort.DEVICE_STATE)
         self._check_range(cell.entry, raw)
         if cell.guard is not None:
@@ -193,16 +193,21 @@ class ObjectStore:
     def _check_range(self, entry: Entry, raw: Raw) -> None:
         if not isinstance(raw, int | float):
             return
+        if (entry.only and raw not in entry.only) or (entry.step > 1 and raw % entry.step):
+            raise RefusedAccessError(Abort.VALUE_RANGE)
         if raw not in entry.also and (entry.minimum is not None or entry.maximum is not None):
             low, high = limits_of(entry, self._lookup)
             if high is not None and raw > high:
                 raise RefusedAccessError(Abort.VALUE_TOO_HIGH)
             if low is not None and raw < low:
                 raise RefusedAccessError(Abort.VALUE_TOO_LOW)
-        if entry.enumeration is not None:
-            enumeration = self.description.enumerations[entry.enumeration]
-            if enumeration.exclusive and all(value.value != raw for value in enumeration.values):
-                raise RefusedAccessError(Abort.VALUE_RANGE)
+        enumeration = self.description.enumeration_of(entry, self._lookup)
+        if (
+            enumeration is not None
+            and enumeration.exclusive
+            and all(value.value != raw for value in enumeration.values)
+        ):
+            raise RefusedAccessError(Abort.VALUE_RANGE)
 
     def _link_mirrors(self) -> None:
         """Let 16-bit mirrors show, and write, the object they mirror.

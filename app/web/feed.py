@@ -27,6 +27,7 @@ from app.service.views import (
     EventLine,
     axis_lines,
     event_of_wire,
+    is_managed,
     is_told,
     node_lines,
     nodes_urgent,
@@ -60,6 +61,7 @@ AXES_S: Final = 0.02
 AXES_LOOK_AGAIN_S: Final = 0.2
 AXES_AT_LEAST_S: Final = 1.0
 NODES_S: Final = 0.25
+ANSWERS_S: Final = 0.5
 LINK_S: Final = 1.0
 LINK_LOOK_S: Final = 0.1
 CURSOR_S: Final = 0.02
@@ -76,6 +78,7 @@ class Feed:
         self._epoch = -1
         self._stage: Stage | None = None
         self._targets: Mapping[str, Target] = {}
+        self._all_managed = True
         self._slugs: Mapping[tuple[str, int], str] = {}
         self._topics: frozenset[str] = frozenset()
         self._devices: frozenset[str] = frozenset()
@@ -170,6 +173,7 @@ class Feed:
         self._epoch, self._stage = self._shown.epoch, self._shown.stage
         targets = () if self._stage is None else self._stage.targets
         self._targets = {target.slug: target for target in targets}
+        self._all_managed = all(is_managed(target) for target in targets)
         self._slugs = {(target.device.bus, target.node): slug for slug, target in self._targets.items()}
         self._cursor = self._since = 0
         self._link, self._axes, self._nodes_urgent = None, (), ()
@@ -214,7 +218,9 @@ class Feed:
             yield CursorMessage(ctx=self._shown.ctx, seq=self._count(), t_ns=line.t_ns, data=line)
 
     def _nodes_due(self, now_s: float) -> Iterator[ServerMessage]:
-        if not self._nodes_changed and "nodes" not in self._fresh:
+        # What a bus without heartbeats has instead comes with every answer, and is told now and then only.
+        answers = not self._all_managed and self._passed("answers", now_s, ANSWERS_S)
+        if not (self._nodes_changed or answers or "nodes" in self._fresh):
             return
         lines = () if self._stage is None else node_lines(self._targets.values(), self._stage.live)
         urgent = nodes_urgent(lines)

@@ -91,7 +91,7 @@ class Guard:
     """Wraps ``app``. ``sign_in_text`` is told to a person who comes without a session where only a token opens one."""
 
     def __init__(self, app: App, access: Access, reach: Reach, sign_in_text: str) -> None:
-        self._app = app
+        self.app = app
         self._access = access
         self._reach = reach
         self._sign_in_text = sign_in_text
@@ -99,7 +99,7 @@ class Guard:
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """ASGI."""
         if scope["type"] not in ("http", "websocket"):
-            await self._app(scope, receive, send)
+            await self.app(scope, receive, send)
             return
         headers = _headers(scope)
         refusal = self._refusal(scope, headers)
@@ -176,14 +176,14 @@ class Guard:
             await send(message)
 
         if scope.get("method") not in _WITH_BODY or scope["path"] in _STREAMED:
-            await self._app(scope, receive, secured)
+            await self.app(scope, receive, secured)
             return
         most = largest_body(str(scope["path"]))
         body = await _body(receive, most)
         if body is None:
             await _refuse(scope, headers, send, _too_large(most))
         else:
-            await self._app(scope, _given(body, receive), secured)
+            await self.app(scope, _given(body, receive), secured)
 
 
 class Leash:

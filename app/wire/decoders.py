@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Protocol
 
-from app.model.description import Description
+from app.model.description import Bus, Description
 from app.wire.decoder import CanOpenDecoder
-from app.wire.frame import Adu, Frame
+from app.wire.frame import Adu, Fdl, Frame
 from app.wire.modbus.decoder import ModbusDecoder
 from app.wire.pdo_follower import PdoRoute
+from app.wire.profibus.decoder import ProfibusDecoder
 from app.wire.records import Record
 
 
@@ -44,16 +45,21 @@ def decoder_of(
     bus: str, descriptions: Mapping[int, Description] | None = None, servers: Mapping[int, str] | None = None
 ) -> BusDecoder:
     """The decoder of ``bus``. ``servers`` are the ``host:port`` of its nodes where it is Modbus TCP, None elsewhere."""
-    if servers is not None:
-        return ModbusDecoder(bus, {server: node for node, server in servers.items()})
-    return CanOpenDecoder(bus, descriptions)
+    speaks = {one.bus for one in (descriptions or {}).values()}
+    if servers is not None or Bus.MODBUS_TCP in speaks:
+        return ModbusDecoder(bus, {server: node for node, server in (servers or {}).items()})
+    return ProfibusDecoder(bus, descriptions) if Bus.PROFIBUS_DP in speaks else CanOpenDecoder(bus, descriptions)
 
 
 def decoder_of_state(bus: str, state: Mapping[str, Any]) -> BusDecoder:
     """One that can take the kept ``state``, without knowing a device."""
-    return ModbusDecoder(bus) if state.get("protocol") == ModbusDecoder.PROTOCOL else CanOpenDecoder(bus)
+    kinds: Mapping[Any, type[ModbusDecoder] | type[ProfibusDecoder]]
+    kinds = {kind.PROTOCOL: kind for kind in (ModbusDecoder, ProfibusDecoder)}
+    return kinds.get(state.get("protocol"), CanOpenDecoder)(bus)
 
 
 def decoder_of_frame(frame: Frame) -> BusDecoder:
     """One for the bus of ``frame``, of which nothing else is known."""
+    if isinstance(frame.payload, Fdl):
+        return ProfibusDecoder(frame.bus)
     return ModbusDecoder(frame.bus) if isinstance(frame.payload, Adu) else CanOpenDecoder(frame.bus)

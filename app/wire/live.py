@@ -21,6 +21,7 @@ from app.wire.memory import Cell, Reading, Stored
 from app.wire.nmt import ALL_NODES, NmtCommand, NmtState
 from app.wire.records import (
     BootUpSeen,
+    DiagnosisSeen,
     EmcySeen,
     EnvironmentSeen,
     GapSeen,
@@ -36,6 +37,8 @@ from app.wire.records import (
     SdoAccess,
     SdoSeen,
     Side,
+    SlaveSeen,
+    SlaveState,
     Source,
     StateSeen,
     SyncSeen,
@@ -110,6 +113,8 @@ class LiveState:
             TransactionSeen: self._on_transaction,
             RestartSeen: self._on_restart,
             MalformedAduSeen: self._on_malformed_adu,
+            SlaveSeen: self._on_slave,
+            DiagnosisSeen: self._on_diagnosis,
         }
 
     # -- writing -----------------------------------------------------------------
@@ -276,6 +281,7 @@ class LiveState:
     def _on_sdo(self, seen: SdoSeen) -> None:
         node = self._node(seen.bus, seen.node)
         if seen.outcome is Outcome.DONE or seen.aborted_by is Side.SERVER:
+            node.answered_ns = seen.t_ns
             self._see(node)
         if seen.client is Direction.RX and node.seen:
             node.other_client_ns = seen.t_ns
@@ -401,6 +407,7 @@ class LiveState:
     def _on_transaction(self, seen: TransactionSeen) -> None:
         node = self._node(seen.bus, seen.node)
         if seen.outcome in (Outcome.DONE, Outcome.ABORTED):
+            node.answered_ns = seen.t_ns
             self._see(node)
         if seen.client is Direction.RX and node.seen:
             node.other_client_ns = seen.t_ns
@@ -422,6 +429,15 @@ class LiveState:
         details = {"fault_key": seen.fault.text_key, "offset": seen.offset, "link": seen.link, "data": seen.data.hex()}
         told = Told(EventKind.MALFORMED, Severity.WARNING, "event.malformed_adu", details)
         self._add_event(seen.t_ns, seen.bus, seen.node, told)
+
+    def _on_slave(self, seen: SlaveSeen) -> None:
+        node = self._node(seen.bus, seen.node)
+        self._see(node)
+        node.silent = seen.state is SlaveState.ABSENT
+        self._touch_node(node)
+
+    def _on_diagnosis(self, seen: DiagnosisSeen) -> None:
+        self._see(self._node(seen.bus, seen.node))
 
     # -- bookkeeping -------------------------------------------------------------
 

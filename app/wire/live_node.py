@@ -17,7 +17,7 @@ class NodeView:
     ``heartbeat_ns`` and ``boot_ns`` are the times of the latest heartbeat and boot-up. ``period_ns`` is that of 1017h
     where known, else the longest interval measured. ``silent``: a heartbeat is overdue. ``emcy_code`` is
     that of the latest emergency message, 0 after "no error". ``other_client_ns``: the latest transfer of a foreign
-    SDO client.
+    SDO client. ``answered_ns``: the latest answer to a request, ours or another's, a refusal included.
     """
 
     bus: str
@@ -32,6 +32,7 @@ class NodeView:
     emcy_code: int | None = None
     emcy_ns: int | None = None
     other_client_ns: int | None = None
+    answered_ns: int | None = None
     version: int = 0
 
 
@@ -39,9 +40,9 @@ class LiveNode:
     """All that is kept of a node. ``seen``: it has said something itself."""
 
     __slots__ = (
-        "boot_ns", "boots", "bus", "commanded", "emcy_code", "emcy_ns", "first_interval_ns", "heartbeat_ns",
-        "interval_ns", "memory", "number", "other_client_ns", "period_ns", "reset_communication", "seen", "silent",
-        "state", "version",
+        "answered_ns", "boot_ns", "boots", "bus", "commanded", "emcy_code", "emcy_ns", "first_interval_ns",
+        "heartbeat_ns", "interval_ns", "memory", "number", "other_client_ns", "period_ns", "reset_communication",
+        "seen", "silent", "state", "version",
     )  # fmt: skip
 
     def __init__(self, bus: str, number: int) -> None:
@@ -61,6 +62,7 @@ class LiveNode:
         self.emcy_code: int | None = None
         self.emcy_ns: int | None = None
         self.other_client_ns: int | None = None
+        self.answered_ns: int | None = None
         self.reset_communication = False
         self.version = 0
 
@@ -79,7 +81,8 @@ class LiveNode:
         """What a reader gets."""
         return NodeView(
             self.bus, self.number, self.state, self.commanded, self.heartbeat_ns, self.period_ns or self.interval_ns,
-            self.silent, self.boot_ns, self.boots, self.emcy_code, self.emcy_ns, self.other_client_ns, self.version,
+            self.silent, self.boot_ns, self.boots, self.emcy_code, self.emcy_ns, self.other_client_ns,
+            self.answered_ns, self.version,
         )  # fmt: skip
 
     def snapshot(self) -> dict[str, Any]:
@@ -90,9 +93,11 @@ class LiveNode:
     def restore(self, state: Mapping[str, Any]) -> None:
         """Go on from ``snapshot()``. Raises KeyError or ValueError on another state."""
         for name in _KEPT:
-            setattr(self, name, state[name])
+            setattr(self, name, state.get(name) if name in _ADDED else state[name])
         self.state = None if state["state"] is None else NmtState(state["state"])
         self.memory.restore(state["memory"])
 
 
 _KEPT: Final = tuple(name for name in LiveNode.__slots__ if name not in ("bus", "number", "memory", "version"))
+_ADDED: Final = frozenset({"answered_ns"})
+"""Not in states of older recordings."""

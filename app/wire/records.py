@@ -46,6 +46,8 @@ class Protocol(Enum):
     """One of many objects by Modbus FC 103."""
     REGISTERS = "registers"
     """Mapped into registers that were written by Modbus FC 6, 16 or 23."""
+    PKW = "pkw"
+    """One parameter by the PKW channel of PROFIBUS; an abort code is the error code of that channel."""
 
 
 class Outcome(Enum):
@@ -97,6 +99,10 @@ class Fault(Enum):
     """A field has a value that the protocol does not know."""
     OPTION = "option"
     """An option that the device does not have."""
+    DELIMITER = "delimiter"
+    """A PROFIBUS telegram does not begin or end with its delimiter."""
+    CHECKSUM = "checksum"
+    """The check sum (FCS) of a PROFIBUS telegram does not fit its bytes."""
 
     @property
     def text_key(self) -> str:
@@ -273,7 +279,10 @@ class RestartSeen(NamedTuple):
 
 
 class MalformedAduSeen(NamedTuple):
-    """A Modbus ADU makes no sense from its byte ``offset`` on. ``link`` is the connection that carried it."""
+    """A Modbus ADU or a PROFIBUS telegram makes no sense from its byte ``offset`` on.
+
+    ``link`` is the connection that carried an ADU, empty for a telegram.
+    """
 
     t_ns: int
     bus: str
@@ -282,6 +291,39 @@ class MalformedAduSeen(NamedTuple):
     fault: Fault
     offset: int
     data: bytes
+
+
+class SlaveState(Enum):
+    """What a PROFIBUS slave was seen to do.
+
+    PRESENT: it answers. WAITING: it wants parameters or a configuration before it exchanges data.
+    """
+
+    ABSENT = "absent"
+    PRESENT = "present"
+    WAITING = "waiting"
+    EXCHANGING = "exchanging"
+
+
+class SlaveSeen(NamedTuple):
+    """A PROFIBUS slave went into another state: found, lost, ready or not."""
+
+    t_ns: int
+    bus: str
+    node: int
+    state: SlaveState
+
+
+class DiagnosisSeen(NamedTuple):
+    """A PROFIBUS slave told its diagnosis: three bytes of status (the first lowest), master, ident number, blocks."""
+
+    t_ns: int
+    bus: str
+    node: int
+    status: int
+    master: int
+    ident: int
+    extended: bytes
 
 
 Record = (
@@ -301,4 +343,6 @@ Record = (
     | TransactionSeen
     | RestartSeen
     | MalformedAduSeen
+    | SlaveSeen
+    | DiagnosisSeen
 )

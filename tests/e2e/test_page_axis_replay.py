@@ -43,7 +43,7 @@ ENABLED: Final = """() => [...document.querySelectorAll(
   .filter((one) => one.closest('[role=radiogroup]') === null)
   .map((one) => one.dataset.testid || one.getAttribute('aria-label') || one.textContent || one.type)"""
 ACTS: Final[tuple[tuple[str, str, dict[str, object]], ...]] = (
-    ("POST", f"live/devices/{PMC_2}/motion/jog", {"fence": 1, "order": 1, "speed_dps": 1.0}),
+    ("POST", f"live/devices/{PMC_2}/motion/jog", {"fence": 1, "order": 1, "speed": 1.0}),
     ("POST", f"live/devices/{PMC_2}/motion/prepare", {"fence": 1, "order": 1}),
     ("POST", "live/motion/lease", {"page": "of the test"}),
     ("POST", f"live/devices/{PMM_2}/battery/test", {}),

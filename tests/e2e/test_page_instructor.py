@@ -307,14 +307,15 @@ def test_twins_that_end_are_told_as_such(browser: Browser, tmp_path: Path) -> No
         demo = let_in(browser, process, "blade-1")
         page = demo.open("instructor?kind=phase_loss")
         expect(page.get_by_test_id("inject")).to_be_enabled()
-        (twins,) = children(process.popen.pid)
+        (twins,) = blades(process.popen.pid)
         os.kill(twins, signal.SIGKILL)
         expect(page.get_by_test_id("twins-silent")).to_contain_text("The twins do not answer")
         expect(page.get_by_test_id("inject")).to_be_disabled()
         demo.context.close()
 
 
-def children(pid: int) -> list[int]:
-    """The processes that a process has started."""
+def blades(pid: int) -> list[int]:
+    """The processes with twins of blades that a demo has started; that of the servo drive is none."""
     tasks = Path(f"/proc/{pid}/task").iterdir()
-    return [int(child) for task in tasks for child in (task / "children").read_text().split()]
+    started = [int(child) for task in tasks for child in (task / "children").read_text().split()]
+    return [child for child in started if b"\0oat\0" in Path(f"/proc/{child}/cmdline").read_bytes()]

@@ -169,6 +169,15 @@ def test_objects_share_a_rule_of_units(tmp_path: Path) -> None:
         ('pdo = "both"', "neither true nor false"),
         ('unit_from = "nothing"', "unit rule 'nothing' does not exist"),
         ("by_variant = { big = { default = 300 } }", "does not fit UNSIGNED8"),
+        ('enumeration_from = { address = "2002", choices = { "1" = "nothing" } }', "enumeration 'nothing'"),
+        ('bits_from = { address = "2002", choices = { "1" = "nothing" } }', "bit table 'nothing'"),
+        ('bits_from = { address = "4711", choices = { "1" = "outputs" } }', "bits_from refers to 4711"),
+        ('limits_from = { address = "4711", choices = { "1" = { min = 1 } } }', "limits_from refers to 4711"),
+        ('limits_from = { address = "2002", choices = { "1" = { min = "low" } } }', "limit 'low'"),
+        ("step = 0", "step is 0"),
+        ("step = 2\ndefault = 5", "default 5 is none of"),
+        ("only = [1, 2]\ndefault = 5", "default 5 is none of"),
+        ('tool_name = ""', "key 'tool_name'"),
     ],
 )
 def test_a_wrong_row_says_why(tmp_path: Path, keys: str, reason: str) -> None:

@@ -143,7 +143,7 @@ def test_entry_for_a_web_client(toy: Description) -> None:
 def test_references_of_an_entry(toy: Description) -> None:
     found = entry(toy, "2003")
     assert found["unit_from"] == {"address": "2004:01", "shaft": "2004:02", "choices": {}}
-    assert found["requires"] == [{"address": "2002", "values": [1]}]
+    assert found["requires"] == [{"address": "2002", "values": [1], "writing": []}]
     assert entry(toy, "1010:03")["verify"] == "ack"
 
 

@@ -48,7 +48,7 @@ def test_every_text_of_a_description_exists(device: str, language: str) -> None:
     assert set(shown(load_builtin(device))) - catalogue(language) == set()
 
 
-@pytest.mark.parametrize("device", ["oat-pmm", "oat-pmc", "nanotec-pd4e"])
+@pytest.mark.parametrize("device", BUILTIN)
 def test_every_object_name_has_a_german_one(device: str) -> None:
     german = catalogue("de")
     names = {name for entry in load_builtin(device) for name in (entry.name, entry.object_name)}

@@ -138,7 +138,7 @@ async def running(
     access = Access(bench.office.sessions, port)
     token = access.issue_token()
     guard = create_app(bench, access, port, scene, "en", page)
-    replays: Replays = guard._app.state.replays  # type: ignore[attr-defined]
+    replays: Replays = guard.app.state.replays  # type: ignore[attr-defined]
     async with serve(guard, listener):
         base = f"http://127.0.0.1:{port}"
         async with (

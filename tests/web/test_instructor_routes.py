@@ -55,7 +55,7 @@ async def server(control: Control, tmp_path: Path) -> AsyncIterator[Server]:
     connection = make_connection()
     base = f"http://127.0.0.1:{port}"
     guard = create_app(bench, access, port)
-    replays = guard._app.state.replays  # type: ignore[attr-defined]
+    replays = guard.app.state.replays  # type: ignore[attr-defined]
     try:
         async with (
             serve(guard, listener),

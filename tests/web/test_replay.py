@@ -34,6 +34,7 @@ REFUSED_IN_REPLAY = {
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/write"),
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/save"),
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/restart"),
+    ("POST", "/api/live/devices/{turbine}/{station}/{device}/verify"),
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/motor"),
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/pdos/preview"),
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/pdos/apply"),
@@ -43,6 +44,7 @@ REFUSED_IN_REPLAY = {
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/jog"),
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/move"),
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/home"),
+    ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/search-home"),
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/reset"),
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/hold"),
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/feather"),
@@ -77,6 +79,7 @@ REFUSED_IN_REPLAY = {
     ("POST", "/api/settings/adapters/test"),
     ("POST", "/api/settings/adapters/bitrate"),
     ("POST", "/api/settings/scan"),
+    ("POST", "/api/settings/identify"),
     ("PUT", "/api/settings/polling"),
 }
 """What reaches a bus or a twin, but STOP and FEATHER, which must always go."""

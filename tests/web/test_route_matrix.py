@@ -73,6 +73,7 @@ ROUTES: Final[dict[tuple[str, str], Role]] = {
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/jog"): TECHNICIAN,
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/move"): TECHNICIAN,
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/home"): TECHNICIAN,
+    ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/search-home"): TECHNICIAN,
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/reset"): TECHNICIAN,
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/hold"): TECHNICIAN,
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/feather"): TECHNICIAN,
@@ -96,6 +97,7 @@ ROUTES: Final[dict[tuple[str, str], Role]] = {
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/write"): TECHNICIAN,
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/save"): TECHNICIAN,
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/restart"): TECHNICIAN,
+    ("POST", "/api/live/devices/{turbine}/{station}/{device}/verify"): TECHNICIAN,
     ("GET", "/api/live/devices/{turbine}/{station}/{device}/changes"): VIEWER,
     ("POST", "/api/live/writes"): TECHNICIAN,
     ("POST", "/api/live/writes/plan"): TECHNICIAN,
@@ -241,6 +243,7 @@ ROUTES: Final[dict[tuple[str, str], Role]] = {
     ("POST", "/api/settings/adapters/test"): TECHNICIAN,
     ("POST", "/api/settings/adapters/bitrate"): TECHNICIAN,
     ("POST", "/api/settings/scan"): TECHNICIAN,
+    ("POST", "/api/settings/identify"): TECHNICIAN,
     ("GET", "/api/settings/jobs/{job_id}"): VIEWER,
     ("GET", "/api/settings/site"): VIEWER,
     ("POST", "/api/settings/site/turbines"): TECHNICIAN,
@@ -323,7 +326,7 @@ def real_routes(scene: HubScene) -> set[tuple[str, str]]:
     bench = bench_with(make_connection())
     guard = create_app(bench, Access(bench.office.sessions, 1), 1, scene)
     found = set()
-    for route in iter_route_contexts(guard._app.routes):  # type: ignore[attr-defined]
+    for route in iter_route_contexts(guard.app.routes):  # type: ignore[attr-defined]
         methods = getattr(route, "methods", None) or {SOCKET}
         found |= {(method, str(route.path)) for method in methods}
     return found

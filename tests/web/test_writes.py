@@ -103,6 +103,7 @@ async def test_the_plan_tells_order_what_has_none_and_what_is_not_known(server: 
         "unordered": [],
         "unknown": [],
         "broken": [],
+        "address_changes": [],
     }
     alone = (await server.client.post("/api/live/writes/plan", json={"rows": both[:1]})).json()
     assert (alone["rows"], alone["unordered"]) == ([], [{"device": pmm, "address": "30FA:02"}])

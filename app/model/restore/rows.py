@@ -27,7 +27,12 @@ def rows_of(device: DeviceValues, wanted: Values, options: PlanOptions) -> Itera
 
 
 def allowed(entry: Entry, options: PlanOptions) -> Allow:
-    """What the write of a row may do beyond ordinary parameters."""
+    """What the write of a row may do beyond ordinary parameters.
+
+    A row that changes the network address is in a batch only, never in a restore; whether it may is not asked here.
+    """
+    if entry.restore is RestoreClass.NETWORK:
+        return Allow.ADDRESS
     return Allow.FACTORY if entry.restore is RestoreClass.FACTORY and options.expert else Allow.NOTHING
 
 

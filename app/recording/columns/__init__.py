@@ -1,6 +1,6 @@
 """Reads recordings by columns: whole chunks of CAN frames as NumPy arrays, and objects decoded out of them.
 
-``can_columns`` gives the frames, ``samples`` the values of chosen objects: exactly those that ``CanOpenDecoder`` sees.
+``can_columns`` gives the frames, ``samples`` the values of chosen objects: exactly those that the decoders see.
 """
 
 from app.recording.can_table import CanColumns

@@ -15,10 +15,12 @@ from app.recording.columns.blocks import Span, can_blocks
 from app.recording.columns.follow import BusFollower
 from app.recording.columns.frames import opened
 from app.recording.columns.listening import Wanted
+from app.recording.columns.telegrams import telegram_values
 from app.recording.columns.values import Samples
 from app.recording.content import Keyframe
 from app.recording.reader import Recording
 from app.wire.decoder import CanOpenDecoder
+from app.wire.decoders import BusDecoder, decoder_of, decoder_of_state
 
 _LOOK_BACK_NS: Final = (10_000_000_000, 120_000_000_000)
 """Where the last keyframe before a time is looked for first; they come every few seconds."""
@@ -42,8 +44,9 @@ def samples(
 ) -> dict[Signal, Samples]:
     """All values of ``signals`` seen from ``start_ns`` on and before ``end_ns``; ``descriptions`` by bus and node.
 
-    The same values at the same times as ``CanOpenDecoder`` sees them by PDO, SDO and emergency message, fed with the
-    frames since the last keyframe at or before the start; without one, with all frames from the beginning of the file.
+    The same values at the same times as the decoder of the bus sees them by process data, parameter traffic and
+    emergency message, fed with the frames since the last keyframe at or before the start; without one, with all frames
+    from the beginning of the file. CAN is read by columns; of Modbus TCP every ADU is decoded.
     Where the file cannot be read the recording's ``damages`` tell. Raises ``RecordingError`` as ``open_recording``
     does.
     """
@@ -52,18 +55,26 @@ def samples(
         by_bus[signal.bus].append(signal)
     with opened(recording) as source:
         keyframe = _keyframe(source, start_ns)
-        followers = {bus: _follower(bus, found, descriptions, keyframe) for bus, found in by_bus.items()}
+        of_modbus = {bus for bus, _ in source.servers}
+        followers = {
+            bus: _follower(bus, found, descriptions, keyframe) for bus, found in by_bus.items() if bus not in of_modbus
+        }
         span = Span(None if keyframe is None else keyframe.t_ns + 1, end_ns)
 
         def prepare(block: Block) -> Block:
             return followers[block.bus].prepare(block)
 
-        for block in can_blocks(source, followers.keys(), span, workers, prepare):
+        for block in can_blocks(source, followers.keys(), span, workers, prepare) if followers else ():
             followers[block.bus].take(block)
+        found = {bus: follower.found for bus, follower in followers.items()}
+        for bus in by_bus.keys() & of_modbus:
+            decoder = decoder_of(bus, servers={node: at for (name, node), at in source.servers.items() if name == bus})
+            _go_on(decoder, keyframe)
+            found[bus] = telegram_values(source, decoder, _places(by_bus[bus]), span)
     return {
-        signal: followers[signal.bus]
-        .found[signal.node, signal.address]
-        .samples(_data_type(descriptions.get(signal[:2]), signal.address), start_ns)
+        signal: found[signal.bus][signal.node, signal.address].samples(
+            _data_type(descriptions.get(signal[:2]), signal.address), start_ns
+        )
         for signal in signals
     }
 
@@ -81,10 +92,18 @@ def _follower(
 ) -> BusFollower:
     described = {node: description for (name, node), description in descriptions.items() if name == bus}
     decoder = CanOpenDecoder(bus, described)
+    _go_on(decoder, keyframe)
+    return BusFollower(decoder, Wanted(_places(signals)))
+
+
+def _go_on(decoder: BusDecoder, keyframe: Keyframe | None) -> None:
     state = {} if keyframe is None else keyframe.state.get("decoders", {})
-    if bus in state:
-        decoder.restore(state[bus])
-    return BusFollower(decoder, Wanted([(signal.node, signal.address) for signal in signals]))
+    if decoder.bus in state:
+        decoder.restore(state[decoder.bus])
+
+
+def _places(signals: list[Signal]) -> list[tuple[int, Address]]:
+    return [(signal.node, signal.address) for signal in signals]
 
 
 def _keyframe(recording: Recording, start_ns: int | None) -> Keyframe | None:
@@ -109,7 +128,7 @@ def _usable(keyframe: Keyframe) -> bool:
         return False
     try:
         for bus, state in decoders.items():
-            CanOpenDecoder(bus).restore(state)
+            decoder_of_state(bus, state).restore(state)
     except (KeyError, ValueError, TypeError, AttributeError):
         return False
     return True

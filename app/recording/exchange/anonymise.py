@@ -21,7 +21,7 @@ from app.recording.exchange.harmless import PERSON, Harmless
 from app.recording.exchange.hiding import STATIONS, Hider, Pseudonyms, shifted_time
 from app.recording.exchange.leftovers import Wanted, find_left
 from app.recording.exchange.origin import OriginKind, origin_table
-from app.recording.exchange.states import first_state, lost_until, shifted
+from app.recording.exchange.states import first_state, lost_until, shifted, without
 from app.recording.exchange.tape import Subject, Tape, Taped
 from app.recording.index.course import Mark, marks_of
 from app.recording.node_table import described, read_nodes
@@ -83,7 +83,8 @@ def anonymise(
 ) -> Anonymised:
     """Writes the copy to ``dst``, which must not exist.
 
-    Raises UsageError where ``src`` is no recording of this bench, and RecordingError, also where something that
+    Of buses that are no CAN buses neither telegrams nor state nor addresses are in it. Raises UsageError where ``src``
+    is no recording of this bench or has no CAN frame, and RecordingError, also where something that
     identifies is found in the copy; there is no copy then.
     """
     with open_recording(src) as recording:
@@ -91,6 +92,8 @@ def anonymise(
             raise UsageError(reason=f"{src.name} is no recording of this bench: import it first")
         if recording.span_ns is None:
             raise UsageError(reason=f"{src.name} holds no frame")
+        if not recording.can_chunks():
+            raise UsageError(reason=f"{src.name} holds no CAN frame, and of telegrams nobody knows what identifies")
         return _Copy(recording, dst, order).write(on_frames)
 
 
@@ -158,7 +161,10 @@ class _Copy:
 
     def _new_info(self) -> RecordingInfo:
         nodes = {}
+        others = {bus for bus, _ in self._recording.servers}
         for key, text in self._info.nodes.items():
+            if key.rpartition("/")[0] in others:
+                continue
             slug, _, description = text.rpartition(" ")
             nodes[key] = f"{self._names.slug(slug)} {description if description in BUILTIN else 'unknown'}"
         versions = {name: version for name, version in self._info.versions.items() if name in ("hubside", *BUILTIN)}
@@ -199,6 +205,7 @@ class _Copy:
         if found is None:
             return []
         t_ns, state = found
+        state = without(state, {bus for bus, _ in self._recording.servers})
         for bus, kept in state["decoders"].items():
             self._hider.decoder(bus).restore(kept)
         hidden = self._hidden_state(state)

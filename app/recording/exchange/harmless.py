@@ -23,10 +23,11 @@ TEXT_KEYS: Final = frozenset(
     settings_changed controller_order fault_set fault_seen fault_cleared faults_cleared fault_ended scenario_started
     scenario_stopped scenario_ended incident_made restore_begun restore_confirmed restore_turned_back restore_resumed
     restore_done restore_rolled_back restore_incomplete restore_given_up nmt_sent lease_taken lease_ended
-    motion_prepared motion_put_back motion_begun motion_ended motion_stopped fault_reset homed pdo_changed pdo_put_back
+    motion_prepared motion_unwatched external_stop motion_lost motion_put_back motion_begun motion_ended motion_stopped
+    fault_reset homed home_found pdo_changed pdo_put_back
     pdo_rolled_back pdo_broken
     battery_test_begun battery_test_ended battery_changed
-    scope_armed scope_captured
+    scope_armed scope_captured verified
     """.split()
 )
 """The texts of events that recordings of this bench bear."""

@@ -5,7 +5,7 @@ And what a recording had lost by then.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from typing import Any, Final
 
 from app.recording.cdr import NS
@@ -38,6 +38,14 @@ def renamed(state: Mapping[str, Any], buses: Mapping[str, str]) -> dict[str, Any
     live = {**live, "nodes": [name(node) for node in live["nodes"]], "events": [name(one) for one in live["events"]]}
     decoders = {buses.get(bus, bus): name(decoder) for bus, decoder in state["decoders"].items()}
     return {**state, "live": live, "decoders": decoders}
+
+
+def without(state: Mapping[str, Any], buses: Collection[str]) -> dict[str, Any]:
+    """The same without what was known of some buses."""
+    live = state["live"]
+    kept = {key: [one for one in live[key] if one["bus"] not in buses] for key in ("nodes", "events")}
+    decoders = {bus: decoder for bus, decoder in state["decoders"].items() if bus not in buses}
+    return {**state, "live": {**live, **kept}, "decoders": decoders}
 
 
 class JoiningCourse(Course):

@@ -24,12 +24,14 @@ from app.recording.index.keyframes import KeyframePacker
 from app.recording.index.near import NearFrames
 from app.recording.index.pages import Page
 from app.recording.index.place import fingerprint, in_cache, index_path
+from app.recording.index.telegrams import telegram_traffic
 from app.recording.index.tracks import Tracks, pack_history
 from app.recording.index.traffic import BusTraffic, LoadPage
 from app.recording.node_table import server_table
 from app.recording.reader import Recording, open_recording
 from app.recording.schemas import FIXED_TOPICS
 from app.wire.events import Event
+from app.wire.modbus.adu import ETHERNET_BPS
 from app.wire.records import Record, Source, ValueSeen
 from app.wire.signs import Sign, SignFinder, folded
 
@@ -149,7 +151,8 @@ class _Builder:
         described = {f"{bus}/{node}": one.id for (bus, node), one in self._descriptions.items()}
         table["described"] = json.dumps(described)
         table["servers"] = json.dumps(server_table(self._recording.servers))
-        return table | {f"bit_rate/{bus}": rates.get(bus, "0") for bus in self._traffic}
+        adus = dict.fromkeys({bus for bus, _ in self._recording.servers}, str(ETHERNET_BPS))
+        return table | {f"bit_rate/{bus}": rates.get(bus, adus.get(bus, "0")) for bus in self._traffic}
 
     def _steps(self) -> Iterator[Step]:
         start_ns, end_ns = self._span_ns
@@ -230,6 +233,10 @@ class _Builder:
                 self._traffic[columns.bus] = BusTraffic(columns.bus, self._recorded_ns[0], self._write_load)
             self._traffic[columns.bus].add(columns.t_ns, frame_bits(columns))
             far_ns = max(far_ns, int(columns.t_ns[-1]))
+            yield far_ns
+        for bus, times, bits in telegram_traffic(self._recording):
+            self._traffic[bus].add(times, bits)
+            far_ns = max(far_ns, int(times[-1]))
             yield far_ns
 
     def _keyframe(self, t_ns: int) -> None:

@@ -65,7 +65,8 @@ def recorded_span(recording: Recording, span_ns: tuple[int, int]) -> tuple[int, 
 
 def damages(recording: Recording) -> list[Gap]:
     """What was found to be damaged until now: from the last frame before it to the first one behind."""
-    places = sorted(recording.can_chunks(), key=lambda place: place.offset)
+    chunks = [*recording.can_chunks(), *recording.telegram_chunks()]
+    places = sorted(chunks, key=lambda place: place.offset)
     gaps = []
     for damage in recording.damages:
         details = {"offset": damage.offset, "length": damage.length, "detail": damage.detail}

@@ -20,6 +20,7 @@ from app.wire.records import (
     GapSeen,
     Outcome,
     Record,
+    RestartSeen,
     SdoAccess,
     SdoSeen,
     Side,
@@ -134,7 +135,7 @@ class Tracks:
                     track.changes += 1
                 if data != track.known and not _command(address, source):
                     track.changed(t_ns, data, source)
-            elif isinstance(record, BootUpSeen):
+            elif isinstance(record, BootUpSeen | RestartSeen):
                 self._all(record, Track.unknown)
             elif isinstance(record, GapSeen):
                 self._all(record, Track.broken)

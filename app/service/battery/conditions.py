@@ -116,7 +116,8 @@ def _nobody_moves(motion: MotionDesk | None) -> Need:
 
 async def _no_restore(connection: Connection, target: Target) -> Need:
     try:
-        await target.pass_gate(connection.driver(target))
+        await target.require_no_restore(connection.driver(target))
+        target.gate.claims.require_unclaimed(target.slug)
     except HubsideError:
         return Need(Condition.NO_RESTORE, True, {})
     return Need(Condition.NO_RESTORE, False, {})

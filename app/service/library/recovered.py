@@ -22,12 +22,22 @@ from app.model.datatypes import Raw
 from app.model.description import Description
 from app.model.sets import Origin, ParameterSet, identity_of, iso_time
 from app.recording.content import Event, EventKind, RecordingInfo
-from app.recording.node_table import read_nodes
+from app.recording.node_table import read_nodes, read_servers
 from app.service.devices import decode
 from app.service.library.series import Progress, Series
-from app.wire.decoder import CanOpenDecoder
-from app.wire.frame import Can, Direction
-from app.wire.records import BootUpSeen, Outcome, Record, SdoAccess, SdoSeen
+from app.wire.decoders import BusDecoder, decoder_of
+from app.wire.frame import Adu, Can, Direction
+from app.wire.records import (
+    BootUpSeen,
+    Outcome,
+    Record,
+    RestartSeen,
+    SdoAccess,
+    SdoSeen,
+    Source,
+    TransactionSeen,
+    ValueSeen,
+)
 from app.wire.sdo import Abort
 
 NOT_SEEN: Final = "not seen"
@@ -123,6 +133,12 @@ class _Node:
             elif address not in self.values:
                 self.failed[address] = f"abort {record.abort_code or 0:08X}h"
 
+    def told(self, record: ValueSeen, ours: bool) -> None:
+        """One value out of a message that held many."""
+        self._forget(record.address)
+        self.values[record.address] = record.data
+        self.seen[record.address] = Seen(record.t_ns, SdoAccess.READ, ours)
+
     def doubt(self, why: Doubt) -> None:
         """Whatever is known now is in doubt from here on."""
         self.seen = {address: one if one.doubt else replace(one, doubt=why) for address, one in self.seen.items()}
@@ -174,25 +190,29 @@ def _nodes_of(
 
 
 def _follow(series: Series, on_progress: Progress | None) -> dict[tuple[str, int], _Node]:
-    decoders: dict[str, CanOpenDecoder] = {}
+    servers = {key: at for info in series.infos for key, at in read_servers(info.servers).items()}
+    of_modbus = {bus: {node: at for (on, node), at in servers.items() if on == bus} for bus, _ in servers}
+    decoders: dict[str, BusDecoder] = {}
     nodes: dict[tuple[str, int], _Node] = {}
     gaps = deque(event for event in series.events() if event.kind in _GAPS)
     for frame in series.frames(on_progress):
         while gaps and gaps[0].t_ns <= frame.t_ns:
             _gap(decoders, nodes, gaps.popleft())
-        if not isinstance(frame.payload, Can):
+        if not isinstance(frame.payload, Can | Adu):
             continue
         decoder = decoders.get(frame.bus)
         if decoder is None:
-            decoder = decoders[frame.bus] = CanOpenDecoder(frame.bus)
-        for record in decoder.feed(frame):
+            decoder = decoders[frame.bus] = decoder_of(frame.bus, servers=of_modbus.get(frame.bus))
+        records = decoder.feed(frame)
+        for record in records:
             _take(nodes, record)
+        _take_dictionary(nodes, records)
     for event in gaps:
         _gap(decoders, nodes, event)
     return nodes
 
 
-def _gap(decoders: Mapping[str, CanOpenDecoder], nodes: dict[tuple[str, int], _Node], event: Event) -> None:
+def _gap(decoders: Mapping[str, BusDecoder], nodes: dict[tuple[str, int], _Node], event: Event) -> None:
     """Frames are missing: transfers that were open are lost, and every value is in doubt. "" is any bus."""
     for bus, decoder in decoders.items():
         if event.bus in ("", bus):
@@ -206,8 +226,18 @@ def _gap(decoders: Mapping[str, CanOpenDecoder], nodes: dict[tuple[str, int], _N
 def _take(nodes: dict[tuple[str, int], _Node], record: Record) -> None:
     if isinstance(record, SdoSeen):
         nodes.setdefault((record.bus, record.node), _Node()).take(record)
-    elif isinstance(record, BootUpSeen) and (record.bus, record.node) in nodes:
+    elif isinstance(record, BootUpSeen | RestartSeen) and (record.bus, record.node) in nodes:
         nodes[record.bus, record.node].doubt(Doubt.BOOT_UP)
+
+
+def _take_dictionary(nodes: dict[tuple[str, int], _Node], records: Sequence[Record]) -> None:
+    """What one message told of many objects (Modbus FC 101 and 102): they are no transfers of their own."""
+    if not records or not isinstance(records[0], TransactionSeen):
+        return
+    told = records[0]
+    for record in records[1:]:
+        if isinstance(record, ValueSeen) and record.source is Source.SDO_READ:
+            nodes.setdefault((record.bus, record.node), _Node()).told(record, told.client is Direction.TX)
 
 
 def _set_of(series: Series, bus: str, number: int, node: _Node, name: Named) -> RecoveredSet:

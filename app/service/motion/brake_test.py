@@ -15,10 +15,11 @@ from typing import Final
 from app.model.address import Address
 from app.model.axis_state import ENERGISED, AxisState
 from app.service.journal import Journal
+from app.service.motion.bounds import HIGHEST, LOWEST, TARGET_VELOCITY
 from app.service.motion.control import AxisMode, Control, Word
 from app.service.motion.desk import Doing, Ended, MotionDesk, Running
 from app.service.motion.interlocks import POSITION
-from app.service.motion.moves import HIGHEST, LOWEST, TARGET_VELOCITY, come_to_rest, raw_of, set_object, wait
+from app.service.motion.moves import come_to_rest, raw_of, set_object, wait
 
 OUTPUTS: Final = Address(0x60FE, 3)
 BRAKE: Final = 1 << 0
@@ -31,6 +32,12 @@ LEAST_DEG: Final = 0.2
 """A blade that has turned less than this has not turned: play and give of the gear."""
 DRIFT_DEG: Final = 0.1
 """More than this is no play."""
+
+
+ERROR_CODE: Final = Address(0x603F)
+_FAULTY: Final = (AxisState.FAULT, AxisState.FAULT_REACTION_ACTIVE)
+HELD_FAST: Final = frozenset({0x8611})
+"""Following error: what an axis tells that has power and does not turn (OAT manual, table 48)."""
 
 
 class BrakeVerdict(Enum):
@@ -78,8 +85,8 @@ async def try_brake(desk: MotionDesk, slug: str, fence: int, journal: Journal) -
 
 async def _away_from_limits(control: Control) -> float:
     """The speed towards the middle of the range, in degrees per second."""
-    middle_deg = (await control.degrees(LOWEST) + await control.degrees(HIGHEST)) / 2
-    return SPEED_DPS if await control.degrees(POSITION) < middle_deg else -SPEED_DPS
+    middle_deg = (await control.scaled(LOWEST) + await control.scaled(HIGHEST)) / 2
+    return SPEED_DPS if await control.scaled(POSITION) < middle_deg else -SPEED_DPS
 
 
 async def _turn(running: Running) -> BrakeTest:
@@ -91,19 +98,26 @@ async def _turn(running: Running) -> BrakeTest:
     lifted_s = await _contact(running, True, began_s)
     if lifted_s is None:
         return BrakeTest(None if running.over.is_set() else BrakeVerdict.NOT_LIFTED)
-    start_deg, end_s = await control.degrees(POSITION), loop.time() + TURN_TIMEOUT_S
+    start_deg, end_s = await control.scaled(POSITION), loop.time() + TURN_TIMEOUT_S
     if not running.over.is_set():
-        control.word(Word.RUN)
+        await control.say(Word.RUN)
     turned_deg = 0.0
     while not running.over.is_set() and loop.time() < end_s and turned_deg < TURN_DEG:
         if control.overtaken:
             running.end(Ended.STOPPED)
         elif await control.state() is not AxisState.OPERATION_ENABLED:
-            break  # an axis that cannot turn falls into a fault
+            if not await _held_fast(control):
+                running.end(Ended.STOPPED)
+            break
         await wait(running)
-        turned_deg = abs(await control.degrees(POSITION) - start_deg)
+        turned_deg = abs(await control.scaled(POSITION) - start_deg)
     stuck = turned_deg < LEAST_DEG and not running.over.is_set()
     return BrakeTest(BrakeVerdict.STUCK if stuck else None, lifted_s, turned_deg)
+
+
+async def _held_fast(control: Control) -> bool:
+    """The axis has a fault because it did not turn; any other one, or none, says nothing of the brake."""
+    return await control.state() in _FAULTY and await control.number(ERROR_CODE) in HELD_FAST
 
 
 async def _rest(running: Running, so_far: BrakeTest) -> BrakeTest:
@@ -113,13 +127,13 @@ async def _rest(running: Running, so_far: BrakeTest) -> BrakeTest:
     if engaged_s is None:
         verdict = so_far.verdict if running.over.is_set() else BrakeVerdict.NOT_ENGAGED
         return replace(so_far, verdict=verdict)
-    start_deg, drift_deg = await control.degrees(POSITION), 0.0
+    start_deg, drift_deg = await control.scaled(POSITION), 0.0
     end_s = loop.time() + WATCH_S
     while not running.over.is_set() and loop.time() < end_s:
         if control.overtaken or await control.state() in ENERGISED:
             running.end(Ended.STOPPED)
         await wait(running)
-        drift_deg = max(drift_deg, abs(await control.degrees(POSITION) - start_deg))
+        drift_deg = max(drift_deg, abs(await control.scaled(POSITION) - start_deg))
     seen = replace(so_far, engaged_s=engaged_s, drift_deg=drift_deg)
     if running.over.is_set() or so_far.verdict is not None:
         return seen

@@ -1,13 +1,16 @@
 """The controlword of one axis in the hands of who moves it (CiA 402; OAT manual 5.8, tables 49 to 53).
 
-Words go by RPDO1, past all queues. Before each one is asked whether anybody else has commanded the axis since, STOP and
-FEATHER first of all: then nothing is sent any more (OvertakenError).
+Words go by RPDO1, past all queues; on a bus without PDOs each is written, and acknowledged before the next. Before each
+one is asked whether anybody else has commanded the axis since, STOP and FEATHER first of all: then nothing is sent any
+more (OvertakenError). What ends a motion goes ahead of all that waits.
 """
 
 from __future__ import annotations
 
 import asyncio
+import logging
 from collections.abc import Awaitable, Callable, Collection
+from decimal import Decimal
 from enum import IntEnum
 from typing import Any, Final
 
@@ -15,11 +18,14 @@ from app.errors import AxisStateError, NotHeldError, OvertakenError, UnverifiedE
 from app.model.address import Address
 from app.model.axis_state import ENERGISED, AxisState
 from app.model.description import Verify
-from app.model.values import to_scaled
+from app.model.values import quantity_of, to_scaled
 from app.service.devices import Target, decode
 from app.service.motion.interlocks import POSITION
 from app.service.motion.left import ModeChanged
 from app.service.stop import CONTROLWORD, EFC_TARGET, STATUSWORD
+from app.service.write import know_what_it_rests_on
+
+log = logging.getLogger(__name__)
 
 MODE: Final = Address(0x6060)
 MODE_SHOWN: Final = Address(0x6061)
@@ -31,7 +37,10 @@ _LOOK_S: Final = 0.01
 STATE_TIMEOUT_S: Final = 3.0
 STAND_TIMEOUT_S: Final = 10.0
 RESET_TIMEOUT_S: Final = 1.0
-_STANDS_DPS: Final = 0.1
+_MODE_TIMEOUT_S: Final = 0.2
+_ANSWER_S: Final = 0.5
+"""So long a device on a bus of its own connection may take for an answer while it is commanded."""
+_STANDS_DPS: Final = Decimal("0.1")
 
 
 class Word(IntEnum):
@@ -52,6 +61,7 @@ class Word(IntEnum):
 
 
 _ENABLE_OPERATION: Final = 1 << 3
+_RUNS: Final = frozenset({Word.RUN, Word.NEW_SET_POINT, Word.FEATHER})
 _OFF: Final = frozenset({AxisState.SWITCH_ON_DISABLED, AxisState.READY})
 TARGET_REACHED: Final = 1 << 10
 ACKNOWLEDGED: Final = 1 << 12
@@ -71,7 +81,7 @@ class AxisMode(IntEnum):
 class Control:
     """Commands to one axis. ``send`` puts the controlword into RPDO1; False: no such PDO is in force.
 
-    ``before_mode`` hears of every mode before it is set.
+    ``send`` None: the bus has no PDOs, and words are written. ``before_mode`` hears of every mode before it is set.
 
     ``own`` begins a command; what else commands the axis after it ends the command.
     """
@@ -80,20 +90,21 @@ class Control:
         self,
         driver: Any,
         target: Target,
-        send: Callable[[bytes], bool],
+        send: Callable[[bytes], bool] | None,
         before_mode: Callable[[int], Awaitable[None]],
     ) -> None:
         self.driver = driver
         self.target = target
         self._send = send
         self._before_mode = before_mode
+        self._answer_s = None if send is not None else _ANSWER_S
         self._known = 0
-        self._sent = self._ended = self._released = False
+        self._sent = self._ended = self._released = self._let_go = False
 
     def own(self) -> None:
         """Command the axis from now on: another order begins."""
         self._known = self._count()
-        self._sent = self._ended = self._released = False
+        self._sent = self._ended = self._released = self._let_go = False
 
     def _count(self) -> int:
         return int(self.driver.commanded(self.target.node, CONTROLWORD))
@@ -108,14 +119,50 @@ class Control:
         if self.overtaken or self._ended:
             raise OvertakenError(address=CONTROLWORD.short, node=self.target.node)
 
-    def word(self, word: Word) -> None:
-        """Send a controlword. Raises OvertakenError, AxisStateError (no PDO takes it at once), BusLostError."""
+    async def say(self, word: Word) -> None:
+        """Send a controlword; where it is written, until the axis has acknowledged it.
+
+        Nothing is sent that would run an axis that was let go. Raises OvertakenError, AxisStateError (no PDO takes it
+        at once), BusLostError, and where it is written what a write raises.
+        """
+        if self._send is not None:
+            self._by_pdo(word)
+            return
+        self.require_own()
+        if self._let_go and word in _RUNS:
+            return
+        self._sent = True
+        try:
+            await self._write(word, known=self._known)
+        except OvertakenError:
+            if self.overtaken or self._ended:
+                raise
+            await self.say(word)  # what let it go went ahead of it: does it still count?
+
+    def _by_pdo(self, word: Word) -> None:
         self.require_own()
         self._sent = True
         if not self._send_counted(word):
             raise AxisStateError(
                 device=self.target.slug, state_key="axis_found.not_by_pdo", wanted_key="axis_needed.operational"
             )
+
+    def let_go(self, word: Word) -> bool:
+        """Nobody holds a running axis any more: ``word`` at once. False where it must be written: ``let_go_by_write``.
+
+        Raises OvertakenError, AxisStateError, BusLostError.
+        """
+        if self._send is not None:
+            self._by_pdo(word)
+            return True
+        self.require_own()
+        self._let_go = True
+        return False
+
+    async def let_go_by_write(self, word: Word) -> None:
+        """``word`` ahead of all that waits, which of this order is not sent any more. Raises what a write raises."""
+        if not self._ended:
+            await self._write_ahead(word)
 
     async def halt(self) -> None:
         """Halt an axis that is enabled; any other one would be enabled by that word. Raises AxisStateError too."""
@@ -124,10 +171,10 @@ class Control:
             raise AxisStateError(
                 device=self.target.slug, state_key=state.text_key, wanted_key=AxisState.OPERATION_ENABLED.text_key
             )
-        self.word(Word.HALT)
+        await self.say(Word.HALT)
 
     def stop(self) -> bool:
-        """Quick stop at once. False where it could not be sent as a PDO and has to be written.
+        """Quick stop at once. False where it could not be sent as a PDO and has to be written: ``stop_by_write``.
 
         What this order had the axis do ends by it. Where it has sent nothing yet, or somebody else has commanded the
         axis since, nothing is sent: it would end a FEATHER. Raises BusLostError.
@@ -139,6 +186,8 @@ class Control:
 
     def _send_counted(self, word: Word) -> bool:
         """A frame that the adapter did not take is counted too: it is ours, not a command of somebody else."""
+        if self._send is None:
+            return False
         try:
             return self._send(word.to_bytes(2, "little"))
         finally:
@@ -152,19 +201,31 @@ class Control:
         if self._released:
             raise NotHeldError(device=self.target.slug)
 
-    async def stop_by_sdo(self) -> None:
+    async def stop_by_write(self) -> None:
         """Quick stop where no PDO carries it: ahead of all that waits. Raises NoAnswerError, DeviceError."""
+        await self._write_ahead(Word.QUICK_STOP)
+
+    async def _write_ahead(self, word: Word) -> None:
         if self.overtaken or not self._sent:
             return
-        data = Word.QUICK_STOP.to_bytes(2, "little")
-        self._known += 1  # an urgent write counts itself
-        await self.driver.write(self.target.node, CONTROLWORD, data, verify=Verify.ACK, urgent=True)
+        self._known += 1  # an urgent write counts itself, before anything else can
+        try:
+            await self._write(word)
+        except OvertakenError:
+            log.debug("%s: %s gave way to what came after it", self.target.slug, word.name)
+
+    async def _write(self, word: Word, known: int | None = None) -> None:
+        """Urgent unless ``known`` tells of what it knows."""
+        data = word.to_bytes(2, "little")
+        await self.driver.write(
+            self.target.node, CONTROLWORD, data, verify=Verify.ACK, urgent=known is None, known=known
+        )
 
     # -- what the axis says --------------------------------------------------------
 
     async def number(self, address: Address) -> int:
         """An object of the axis. Raises NoAnswerError, DeviceError, AxisStateError (no number came)."""
-        data = await self.driver.read(self.target.node, address)
+        data = await self.driver.read(self.target.node, address, self._answer_s)
         raw = decode(self.target.entry(address), data)
         if not isinstance(raw, int):
             raise AxisStateError(
@@ -213,12 +274,17 @@ class Control:
             return False
         if not await self.number(CONTROLWORD) & _EFC or await self.state() not in ENERGISED:
             return False
-        far = abs(await self.degrees(POSITION) - await self.degrees(EFC_TARGET)) > _AT_TARGET_DEG
+        far = abs(await self.scaled(POSITION) - await self.scaled(EFC_TARGET)) > _AT_TARGET_DEG
         return far or not await self.until_still(timeout_s=0.0)
 
-    async def degrees(self, address: Address) -> float:
-        """An angle of the axis, or its speed, by its own word. Raises AxisStateError where its scale is not known."""
-        found = to_scaled(self.target.entry(address), await self.number(address), self.target.lookup)
+    async def scaled(self, address: Address) -> float:
+        """An object in the unit that its description gives it: degrees and degrees a second at a blade.
+
+        Raises AxisStateError where its scale is not known.
+        """
+        entry = self.target.entry(address)
+        await know_what_it_rests_on(self.driver, self.target, entry)
+        found = to_scaled(entry, await self.number(address), self.target.lookup)
         if found is None:
             raise AxisStateError(
                 device=self.target.slug,
@@ -234,7 +300,9 @@ class Control:
         entry = self.target.entry(VELOCITY)
         while True:
             speed = to_scaled(entry, await self.number(VELOCITY), self.target.lookup)
-            if speed is not None and abs(speed.number) <= _STANDS_DPS:
+            # A drive that counts coarser than that may show one step at rest.
+            step = quantity_of(entry, self.target.lookup).scale
+            if speed is not None and abs(speed.number) <= max(_STANDS_DPS, step):
                 return True
             if asyncio.get_running_loop().time() >= end_s:
                 return False
@@ -266,7 +334,7 @@ class Control:
         """Output stage off, brake engaged: ready, or switch-on disabled. Raises AxisStateError, OvertakenError."""
         state = await self.state()
         if state in (AxisState.OPERATION_ENABLED, AxisState.SWITCHED_ON):
-            self.word(Word.SHUTDOWN)
+            await self.say(Word.SHUTDOWN)
         if state is not AxisState.FAULT:
             await self.until({*_OFF, AxisState.FAULT})
 
@@ -275,12 +343,16 @@ class Control:
         if await self.number(MODE_SHOWN) == mode:
             return
         await self.switch_off()
-        self.word(Word.SHUTDOWN)
+        await self.say(Word.SHUTDOWN)
         await self._until_heard()
         await self._before_mode(mode)
         self.require_own()
         await self.driver.write(self.target.node, MODE, mode.to_bytes(1, "little"), verify=Verify.ACK)
-        found = await self.number(MODE_SHOWN)
+        end_s = asyncio.get_running_loop().time() + _MODE_TIMEOUT_S
+        while (found := await self.number(MODE_SHOWN)) != mode:
+            if asyncio.get_running_loop().time() >= end_s:
+                break
+            await asyncio.sleep(_LOOK_S)
         if found != mode:
             raise UnverifiedError(
                 address=MODE.short, name="mode", sent=str(int(mode)), found=str(found), reason_key="unverified.mode"
@@ -295,7 +367,8 @@ class Control:
         write raises.
         """
         self.own()  # before the look: a FEATHER that comes after it is not ended by what is sent here
-        mode = changed.was or AxisMode.PROFILE_POSITION
+        # A mode that is a saved setting has to be what it was, none too.
+        mode = changed.was if self.target.entry(MODE).saved else changed.was or AxisMode.PROFILE_POSITION
         shown = await self.number(MODE_SHOWN)
         if shown == mode or not changed.stands(shown):
             return True
@@ -303,7 +376,7 @@ class Control:
         if word & _EFC or not await self.status() & REMOTE or await self.state() in ENERGISED:
             return False
         if word & _ENABLE_OPERATION:
-            self.word(Word.NO_POWER)
+            await self.say(Word.NO_POWER)
             await self._until_heard()
         self.require_own()
         await self.driver.write(self.target.node, MODE, mode.to_bytes(1, "little", signed=True), verify=Verify.ACK)
@@ -330,15 +403,15 @@ class Control:
                 device=self.target.slug, state_key=state.text_key, wanted_key=AxisState.OPERATION_ENABLED.text_key
             )
         if state is AxisState.OPERATION_ENABLED:
-            self.word(Word.HALT)
+            await self.say(Word.HALT)
             return
-        self.word(Word.SHUTDOWN)
+        await self.say(Word.SHUTDOWN)
         await self.until({AxisState.READY})
         self._require_held()
-        self.word(Word.SWITCH_ON)
+        await self.say(Word.SWITCH_ON)
         await self.until({AxisState.SWITCHED_ON})
         self._require_held()
-        self.word(Word.HALT)
+        await self.say(Word.HALT)
         await self.until({AxisState.OPERATION_ENABLED})
 
     async def reset_fault(self) -> AxisState:
@@ -352,20 +425,23 @@ class Control:
         state = AxisState.of(status)
         if status & REMOTE and state is not None and state is not AxisState.FAULT:
             return state  # there is none: its words would end what is under way
-        if not status & REMOTE or not self._reset_by_word():
+        by_object = MANUAL in self.target.description.entries
+        if (by_object and not status & REMOTE) or not await self._reset_by_word(by_object):
             self.require_own()
             for data in (b"\x80", b"\0"):
                 await self.driver.write(self.target.node, MANUAL, data, verify=Verify.ACK)
         return await self._reset_done()
 
-    def _reset_by_word(self) -> bool:
-        """The edge of bit 7 as a PDO; False where the node is not operational, and nothing was sent."""
+    async def _reset_by_word(self, may_fail: bool) -> bool:
+        """The edge of bit 7; False where no PDO takes it and it may fail, and nothing was sent."""
         try:
-            self.word(Word.SHUTDOWN)
+            await self.say(Word.SHUTDOWN)
         except AxisStateError:
+            if not may_fail:
+                raise
             return False
-        self.word(Word.FAULT_RESET)
-        self.word(Word.SHUTDOWN)
+        await self.say(Word.FAULT_RESET)
+        await self.say(Word.SHUTDOWN)
         return True
 
     async def _reset_done(self) -> AxisState:

@@ -199,7 +199,7 @@ class _Run:
             if self._running.over.is_set():
                 return
             self._running.turning = True
-            self._control.word(Word.RUN)
+            await self._control.say(Word.RUN)
             measuring = asyncio.create_task(self._measure(samples))
             try:
                 await self._play()

@@ -18,9 +18,11 @@ from typing import Final
 
 from app.drivers.contract import LinkState
 from app.errors import (
+    BusLostError,
     HubsideError,
     InterlockError,
     LeaseHeldError,
+    NoAnswerError,
     NotConnectedError,
     NotHeldError,
     NotPreparedError,
@@ -29,6 +31,7 @@ from app.errors import (
     PdoBusyError,
     UsageError,
 )
+from app.model.address import Address
 from app.model.axis_state import AxisState
 from app.service.connection import Connection
 from app.service.devices import Target
@@ -36,19 +39,24 @@ from app.service.journal import Journal, Kind
 from app.service.motion import interlocks, preparation
 from app.service.motion.control import Control, Word
 from app.service.motion.dead_man import SILENCE_S, DeadMan
-from app.service.motion.heartbeat import Heartbeat
-from app.service.motion.interlocks import Confirmed, Standing
+from app.service.motion.heartbeat import Heartbeat, NoHeartbeat
+from app.service.motion.interlocks import Confirmed, Interlock, Standing
 from app.service.motion.lease import Holder, Lease
 from app.service.motion.left import Left
 from app.service.motion.preparation import Prepared
 from app.service.stop import CONTROLWORD, is_axis
 
+UNKNOWN: Final = "–"
 log = logging.getLogger(__name__)
 
 TICK_S: Final = 0.02
+BACK_S: Final = 30.0
+"""A device that cannot be reached for so long may have another master since."""
 OBEY_S: Final = 0.25
 """An axis that is still enabled so long after a quick stop has not heard it."""
 CLOSE_S: Final = 8.0
+LOOK_AGAIN_S: Final = 0.5
+"""So often it is looked while an axis moves whether an interlock holds it back now."""
 
 
 class Doing(Enum):
@@ -74,12 +82,14 @@ class Ended(Enum):
     SILENT = "silent"
     LEASE = "lease"
     LINK = "link"
+    INTERLOCK = "interlock"
     LIMIT = "limit"
     STOPPED = "stopped"
     FAILED = "failed"
 
 
-_STOPPED: Final = (Ended.SILENT, Ended.LEASE, Ended.LINK)
+_UNHEARD: Final = (BusLostError, NoAnswerError)
+_STOPPED: Final = (Ended.SILENT, Ended.LEASE, Ended.LINK, Ended.INTERLOCK)
 """A quick stop was sent already."""
 
 
@@ -147,13 +157,32 @@ class MotionDesk:
         self._closed = False
         self._heartbeats = {
             bus.name: Heartbeat(connection.buses[bus.name].driver, bus.heartbeat_node, now_s)
+            if connection.buses[bus.name].has_pdos
+            else NoHeartbeat(now_s)
             for bus in connection.turbine.buses
-            if bus.heartbeat_node is not None
         }
         self._reconnects: dict[str, int] = {}
+        connection.gate.claims.axes = self
         self._ticker: asyncio.Task[None] | None = None
         self._changing = asyncio.Lock()
         self._chores: set[asyncio.Task[None]] = set()
+
+    # -- what others are kept from --------------------------------------------------------
+
+    def keeper(self, device: str, address: Address | None) -> str | None:
+        """See ``service.claims.Axes``. What stands of an earlier server is not to be saved either."""
+        running, holder = self.running, self.lease.holder
+        person = UNKNOWN if holder is None else holder.person
+        if running is not None and running.slug == device:
+            return person
+        changed = self.left.of(device)
+        if device in self.prepared:
+            return person if address is None or address in changed else None
+        return person if address is None and changed and not self._closed else None
+
+    def before(self, device: str) -> dict[Address, bytes]:
+        """See ``service.claims.Axes``."""
+        return {address: changed.was for address, changed in self.left.of(device).items()}
 
     # -- looking after it ---------------------------------------------------------------
 
@@ -205,13 +234,39 @@ class MotionDesk:
         return status.state is not LinkState.CONNECTED or status.reconnects != before
 
     def _link_lost(self, bus: str) -> None:
-        """The drives on it stop by themselves, for our heartbeat does not come again; each must prove it anew."""
+        """The drives on it stop by themselves, for our heartbeat does not come again; each must prove it anew.
+
+        Where they cannot, nobody knows what they do: one that was told to run is stopped once the link is back.
+        """
         running = self.running
         if running is not None and running.control.target.device.bus == bus:
-            self._stop_running(running, Ended.LINK)
+            self._lost(running)
         for axis in self.prepared.values():
             if axis.control.target.device.bus == bus:
-                axis.proof_s = None
+                axis.void()
+
+    def _lost(self, running: Running) -> None:
+        """Nothing is heard of the axis any more."""
+        self._stop_running(running, Ended.LINK)
+        if not self._heartbeats[running.control.target.device.bus].watched:
+            if (axis := self.prepared.get(running.slug)) is not None:
+                axis.void()
+            self._journal.note(Kind.MOTION_LOST, running.slug)
+            self._chore(self._stop_once_back(running.control))
+
+    async def _stop_once_back(self, control: Control) -> None:
+        """Quick stop as soon as the device can be reached again, unless somebody else has commanded it by then."""
+        link = self.connection.buses[control.target.device.bus]
+        end_s = monotonic() + BACK_S
+        while monotonic() < end_s and not control.overtaken:
+            if link.status.state is LinkState.CONNECTED:
+                try:
+                    await control.stop_by_write()
+                except (BusLostError, NoAnswerError) as error:
+                    log.warning("%s: not stopped yet: %s", control.target.slug, error.code)
+                else:
+                    return
+            await asyncio.sleep(TICK_S)
 
     def page_gone(self, page: str) -> None:
         """The socket of a page is closed: who held by it holds nothing any more."""
@@ -246,10 +301,19 @@ class MotionDesk:
             running.end(Ended.RELEASED)
             return
         try:
-            running.control.word(running.let_go)
+            at_once = running.control.let_go(running.let_go)
             running.end(Ended.RELEASED)
+            if not at_once:
+                self._chore(self._let_go_by_write(running))
         except OvertakenError:  # STOP or FEATHER has it now
             running.end(Ended.STOPPED)
+        except HubsideError as error:
+            log.warning("%s: halt was not sent: %s", running.slug, error.code)
+            self._stop_running(running, Ended.RELEASED)
+
+    async def _let_go_by_write(self, running: Running) -> None:
+        try:
+            await running.control.let_go_by_write(running.let_go)
         except HubsideError as error:
             log.warning("%s: halt was not sent: %s", running.slug, error.code)
             self._stop_running(running, Ended.RELEASED)
@@ -265,7 +329,7 @@ class MotionDesk:
             self._heartbeats[running.control.target.device.bus].withhold(running.slug)
             by_pdo = False
         if not by_pdo:
-            self._chore(running.control.stop_by_sdo())
+            self._chore(running.control.stop_by_write())
         self._chore(self._see_off(running.control))
         self._journal.note(Kind.MOTION_STOPPED, running.slug, reason=why.value)
 
@@ -284,7 +348,7 @@ class MotionDesk:
             heartbeat.go_on(slug)
             return
         heartbeat.withhold(slug)
-        await control.stop_by_sdo()
+        await control.stop_by_write()
         if await control.until_off(preparation.OFF_TIMEOUT_S):
             heartbeat.go_on(slug)
 
@@ -350,7 +414,7 @@ class MotionDesk:
         else:
             self._journal.by(holder.person).note(Kind.LEASE_TAKEN)
         for axis in self.prepared.values():
-            axis.proof_s = None  # at once: what is being put back must not move meanwhile
+            axis.void()  # at once: what is being put back must not move meanwhile
         if self.prepared:
             self._chore(self._put_all_back())
 
@@ -365,17 +429,46 @@ class MotionDesk:
         self._order = order
 
     def confirm(self, fence: int, confirmed: Confirmed) -> None:
-        """What the holder has looked at. Raises LeaseNeededError, LeaseError."""
-        self.lease.check(fence)
+        """What the holder has looked at; who takes it back stops what moves.
+
+        Raises LeaseNeededError, LeaseError, UsageError (no such stop is named).
+        """
+        journal = self._journal.by(self.lease.check(fence).person)
+        for slug in sorted(confirmed.external_stops - self.confirmed.external_stops):
+            stop = self._axis(slug).device.external_stop
+            if not stop:
+                raise UsageError(reason=f"{slug}: the site file names no external_stop")
+            journal.note(Kind.EXTERNAL_STOP, slug, stop=stop)
         self.confirmed = confirmed
+        running = self.running
+        if running is not None and running.held and not (confirmed.rotor_locked and confirmed.people_out):
+            self._stop_running(running, Ended.INTERLOCK)
 
     # -- interlocks and preparation ------------------------------------------------------------
 
     async def interlocks(self, slug: str) -> list[Standing]:
         """How every interlock of an axis stands. Raises UsageError."""
         target = self._axis(slug)
-        heartbeat = self._heartbeats.get(target.device.bus)
+        heartbeat = self._heartbeats[target.device.bus]
         return await interlocks.look(self.connection, target, heartbeat, self.confirmed, self.batteries_tested)
+
+    async def _watch_interlocks(self, running: Running) -> None:
+        """Stop what is held as soon as an interlock bites that did not at its beginning.
+
+        But for the rules: only a write could break one, and nobody writes to an axis that moves.
+        """
+        while True:
+            await asyncio.sleep(LOOK_AGAIN_S)
+            try:
+                found = await self.interlocks(running.slug)
+            except HubsideError as error:
+                log.info("%s: interlocks cannot be looked at: %s", running.slug, error.code)
+                continue
+            if running.over.is_set() or not running.held:
+                return
+            if any(one.holds_back for one in found if one.interlock is not Interlock.RULES):
+                self._stop_running(running, Ended.INTERLOCK)
+                return
 
     async def require_clear(self, slug: str) -> None:
         """Raises InterlockError for the first interlock that holds the axis back."""
@@ -384,7 +477,9 @@ class MotionDesk:
                 raise InterlockError(device=slug, **standing.reason)
 
     async def prepare(self, slug: str, fence: int) -> Prepared:
-        """Set an axis up and have it prove that it stops by itself; held all the while.
+        """Set an axis up and have it prove that it stops by itself, where its bus has what it could prove it by.
+
+        Held all the while.
 
         Raises LeaseError and its like, InterlockError, NotHeldError, and what a write raises. Where it fails, what was
         changed is put back.
@@ -398,14 +493,21 @@ class MotionDesk:
             try:
                 async with self._changing:  # the settings of an earlier lease may just be put back
                     self.prepared[slug] = axis  # another one: who puts the earlier one back finds it gone
-                    await preparation.set_up(axis, heartbeat, self.left, journal)
-                await preparation.prove(axis, heartbeat, lambda: not running.over.is_set())
-                running.held = False  # the axis has no power of ours any more
-                await preparation.after_proof(control)
+                    if heartbeat.watched:
+                        await preparation.set_up(axis, heartbeat, self.left, journal)
+                    else:
+                        await preparation.take_unwatched(axis, heartbeat, self.left)
+                if heartbeat.watched:
+                    await preparation.prove(axis, heartbeat, lambda: not running.over.is_set())
+                    running.held = False  # the axis has no power of ours any more
+                    await preparation.after_proof(control)
             except BaseException:
                 await asyncio.shield(self._put_back(axis, journal))
                 raise
-            journal.note(Kind.MOTION_PREPARED, slug, proof_ms=round(1000 * (axis.proof_s or 0.0)))
+            if axis.unwatched:
+                journal.note(Kind.MOTION_UNWATCHED, slug)
+            else:
+                journal.note(Kind.MOTION_PREPARED, slug, proof_ms=axis.proof_ms)
 
         journal = self._journal.by(self.lease.check(fence).person)
         await self._run(slug, fence, Doing.PREPARING, control, work, held=True)
@@ -437,7 +539,7 @@ class MotionDesk:
 
     async def _put_back(self, axis: Prepared, journal: Journal) -> None:
         heartbeat = self._heartbeats[axis.control.target.device.bus]
-        axis.proof_s = None  # before anything is written: it must not move any more
+        axis.void()  # before anything is written: it must not move any more
         async with self._changing:
             if self.prepared.get(axis.slug) is not axis:
                 return
@@ -525,12 +627,12 @@ class MotionDesk:
         """Let ``work`` command a prepared axis. Raises what ``_run`` raises, NotPreparedError."""
         axis = self.prepared.get(slug)
         self.lease.check(fence)
-        if axis is None or axis.proof_s is None:
+        if axis is None or not axis.may_move:
             raise NotPreparedError(device=slug)
 
         async def checked(running: Running) -> None:
             await preparation.check(axis)
-            if axis.proof_s is None or self.prepared.get(slug) is not axis:
+            if not axis.may_move or self.prepared.get(slug) is not axis:
                 raise NotPreparedError(device=slug)
             await work(running)
 
@@ -559,6 +661,7 @@ class MotionDesk:
         running = self.running = Running(slug, doing, control, held, order)
         journal = self._journal.by(holder.person)
         error: HubsideError | None = None
+        watch: asyncio.Task[None] | None = None
         try:
             await self.require_clear(slug)
             await self._require_no_feather(control)
@@ -567,15 +670,22 @@ class MotionDesk:
                 raise NotHeldError(device=slug)
             journal.note(Kind.MOTION_BEGUN, slug, what=doing.value)
             running.task = asyncio.ensure_future(_as_none(work(running)))
+            if held:
+                watch = asyncio.create_task(self._watch_interlocks(running))
             await asyncio.shield(running.task)
             running.end(Ended.DONE)
         except BaseException as failed:  # whatever it is: nobody looks after the axis any more
             error = failed if isinstance(failed, HubsideError) else None
             if running.why not in _STOPPED:
-                self._stop_running(running, Ended.FAILED)
+                if isinstance(failed, _UNHEARD) and not self._heartbeats[control.target.device.bus].watched:
+                    self._lost(running)  # a connection whose end nobody tells looks like this
+                else:
+                    self._stop_running(running, Ended.FAILED)
             running.end(Ended.FAILED)
             raise
         finally:
+            if watch is not None:
+                watch.cancel()
             if running.task is not None and not running.task.done():
                 running.task.cancel()  # whoever waited for it is gone
             self.running = None
@@ -615,8 +725,8 @@ class MotionDesk:
         link = self.connection.buses[target.device.bus]
         return Control(
             link.driver,
-            target,
-            lambda data: link.send_pdo(target.node, CONTROLWORD, data),
+            target.past_claims(),
+            (lambda data: link.send_pdo(target.node, CONTROLWORD, data)) if link.has_pdos else None,
             lambda mode: self.left.note_mode_set(target.slug, mode),
         )
 

@@ -54,20 +54,20 @@ async def feather(desk: MotionDesk, slug: str, fence: int) -> Feathered:
 async def _drive(running: Running) -> Feathered:
     control, loop = running.control, asyncio.get_running_loop()
     running.let_go = Word.QUICK_STOP
-    target_deg, from_deg = await control.degrees(EFC_TARGET), await control.degrees(POSITION)
+    target_deg, from_deg = await control.scaled(EFC_TARGET), await control.scaled(POSITION)
     began_s = loop.time()
     if abs(from_deg - target_deg) <= _REACHED_DEG:
         return Feathered(from_deg, from_deg, target_deg, 0.0)
     try:
         if not running.over.is_set():
             running.turning = True
-            control.word(Word.FEATHER)
+            await control.say(Word.FEATHER)
             await control.until({*ENERGISED, *_FAILED}, BEGIN_TIMEOUT_S)
         await _until_there(running, target_deg)
         took_s = loop.time() - began_s
     finally:
         await come_to_rest(running, halt=False)
-    to_deg = await control.degrees(POSITION)
+    to_deg = await control.scaled(POSITION)
     if running.why is Ended.DONE and abs(to_deg - target_deg) > _REACHED_DEG:
         raise AxisStateError(device=running.slug, state=f"{to_deg:.2f}°", wanted=f"{target_deg:.2f}°")
     return Feathered(from_deg, to_deg, target_deg, took_s)
@@ -82,7 +82,7 @@ async def _until_there(running: Running, target_deg: float) -> None:
             raise AxisStateError(
                 device=running.slug, state_key=state.text_key, wanted_key=AxisState.OPERATION_ENABLED.text_key
             )
-        near = abs(await control.degrees(POSITION) - target_deg) <= _REACHED_DEG
+        near = abs(await control.scaled(POSITION) - target_deg) <= _REACHED_DEG
         if control.overtaken:
             running.end(Ended.STOPPED)
         elif near and await control.until_still(timeout_s=0.0):

@@ -23,7 +23,7 @@ class Heartbeat:
     def __init__(self, driver: Any, node: int, monotonic_s: Callable[[], float]) -> None:
         self.node = node
         self._driver = driver
-        self._now_s = monotonic_s
+        self.now_s = monotonic_s
         self._watching: set[str] = set()
         self._withheld: set[str] = set()
         self._cut = False
@@ -69,8 +69,13 @@ class Heartbeat:
 
     def tick(self) -> None:
         """Send when it is time."""
-        if self._watching and not self._withheld and not self._cut and self._now_s() - self._last_s >= PERIOD_S:
+        if self._watching and not self._withheld and not self._cut and self.now_s() - self._last_s >= PERIOD_S:
             self._send()
+
+    @property
+    def watched(self) -> bool:
+        """A device can watch us on this bus."""
+        return True
 
     def _send(self) -> None:
         try:
@@ -78,4 +83,24 @@ class Heartbeat:
         except HubsideError as error:  # the link is gone: the drives stop by themselves
             log.debug("heartbeat: %s", error.code)
             return
-        self._last_s = self._now_s()
+        self._last_s = self.now_s()
+
+
+class NoHeartbeat(Heartbeat):
+    """A bus without heartbeats: it is known which axes are prepared, and whether the link was lost since."""
+
+    def __init__(self, monotonic_s: Callable[[], float]) -> None:
+        super().__init__(None, 0, monotonic_s)
+
+    @property
+    def watched(self) -> bool:
+        """No device can."""
+        return False
+
+    @property
+    def seen(self) -> bool:
+        """Nobody has its number."""
+        return False
+
+    def _send(self) -> None:
+        self._last_s = self.now_s()

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any, Final
 
-from app.drivers.contract import LinkState
+from app.drivers.contract import TWIN_NAME, LinkState
 from app.errors import HubsideError
 from app.model.address import Address
 from app.model.rules.rule import Severity
@@ -17,16 +17,19 @@ from app.recording.writer import RecorderState
 from app.service.bus_link import BusLink
 from app.service.connection import Connection
 from app.service.devices import Target
+from app.service.link import DEVICE_NAME
 from app.service.motion.heartbeat import Heartbeat
-from app.service.motion.self_tests import Testing, look_at_tests
+from app.service.motion.self_tests import Testing, Tests, look_at_tests
 from app.service.restore.precheck import MASTER_QUIET_NS
 from app.service.rule_check import check_live
-from app.service.stop import is_axis
+from app.service.stop import has_feather, is_axis
 from app.service.views import STALE_NS, AxisLine, axis_lines
 
 POSITION: Final = Address(0x6064)
 ASK_TIMEOUT_S: Final = 0.5
 FEATHER_DEG: Final = 75.0
+BEYOND_DEG: Final = 105.0
+"""No blade is in feather there: its position is wrong, after a lost homing say."""
 """A blade at this angle or beyond is in feather: the rotor does not take up wind by it."""
 
 
@@ -42,6 +45,9 @@ class Interlock(Enum):
     NO_MASTER = "no_master"
     RECORDING = "recording"
     HEARTBEAT_NODE = "heartbeat_node"
+    SELF_STOP = "self_stop"
+    """Something stops it by itself when the connection is lost, or may it do without."""
+    ZONE_CLEAR = "zone_clear"
     BATTERY_TEST = "battery_test"
     INPUT_TEST = "input_test"
 
@@ -63,44 +69,92 @@ class Standing:
 
 @dataclass(frozen=True, slots=True)
 class Confirmed:
-    """What a person has looked at and says."""
+    """What a person has looked at and says. ``external_stops``: devices whose stop by hand an expert answers for."""
 
     rotor_locked: bool = False
     people_out: bool = False
+    external_stops: frozenset[str] = frozenset()
 
 
 async def look(
     connection: Connection,
     target: Target,
-    heartbeat: Heartbeat | None,
+    heartbeat: Heartbeat,
     confirmed: Confirmed,
     tested_here: Collection[str] = (),
 ) -> list[Standing]:
     """How every interlock of an axis stands now. ``tested_here``: stations whose battery is tested by this bench.
 
-    Of blades that nobody has looked at lately the angle is asked, and the units of the axis what they test.
+    Those of a blade are asked of an axis that turns one. Of blades that nobody has looked at lately the angle is asked,
+    and the units of the axis what they test.
     """
-    tests, _ = await asyncio.gather(look_at_tests(connection, target), _ask_others(connection, target))
     link = connection.buses[target.device.bus]
-    status = link.status
+    blade = turns_blade(connection, target)
+    tests = Tests()
+    if blade:
+        tests, _ = await asyncio.gather(look_at_tests(connection, target), _ask_others(connection, target))
     state = None if connection.recording is None else connection.recording.status().state
     return [
-        Standing(Interlock.CONNECTED, status.state is not LinkState.CONNECTED, {"bus": link.name}),
+        Standing(Interlock.CONNECTED, link.status.state is not LinkState.CONNECTED, {"bus": link.name}),
+        *(_of_blade(connection, target, confirmed) if blade else _of_bench(confirmed)),
+        _rules(connection.targets, target),
+        await _restore(connection, target),
+        *((_masters(link, connection.stamper()),) if heartbeat.watched else ()),
+        Standing(Interlock.RECORDING, state is not RecorderState.RECORDING, {}),
+        Standing(Interlock.HEARTBEAT_NODE, heartbeat.seen, {"node": heartbeat.node})
+        if heartbeat.watched
+        else await _without_watch(connection, target, confirmed),
+        *(_tested(tests, station_slug(target.slug) in tested_here) if blade else ()),
+    ]
+
+
+def turns_blade(connection: Connection, target: Target) -> bool:
+    """The axis has an emergency feather drive, or stands at a blade."""
+    station = next(one for one in connection.turbine.stations if target.device in one.devices)
+    return station.blade is not None or has_feather(target)
+
+
+def _of_blade(connection: Connection, target: Target, confirmed: Confirmed) -> list[Standing]:
+    return [
         Standing(Interlock.ROTOR_LOCKED, not confirmed.rotor_locked, {}),
         Standing(Interlock.PEOPLE_OUT, not confirmed.people_out, {}),
         _others(connection, target),
-        _rules(connection.targets, target),
-        await _restore(connection, target),
-        _masters(link, connection.stamper()),
-        Standing(Interlock.RECORDING, state is not RecorderState.RECORDING, {}),
-        Standing(
-            Interlock.HEARTBEAT_NODE,
-            heartbeat is None or heartbeat.seen,
-            {"node": "–" if heartbeat is None else heartbeat.node},
-        ),
-        _battery(tests.battery, station_slug(target.slug) in tested_here),
+    ]
+
+
+def _of_bench(confirmed: Confirmed) -> list[Standing]:
+    return [Standing(Interlock.ZONE_CLEAR, not confirmed.people_out, {})]
+
+
+def _tested(tests: Tests, here: bool) -> list[Standing]:
+    return [
+        _battery(tests.battery, here),
         Standing(Interlock.INPUT_TEST, tests.inputs is not Testing.NO, {"clamps": tests.clamps}),
     ]
+
+
+async def _without_watch(connection: Connection, target: Target, confirmed: Confirmed) -> Standing:
+    """By its bus it cannot stop by itself: it says now that it is a twin, or somebody answers for its stop by hand."""
+    stop = target.device.external_stop
+    if await _is_twin(connection, target):
+        state = "twin"
+    elif not stop:
+        state = "none"
+    else:
+        state = "confirmed" if target.slug in confirmed.external_stops else "not_confirmed"
+    details = {"state_key": f"interlock.external_stop.{state}", "stop": stop or "–"}
+    return Standing(Interlock.SELF_STOP, state in ("none", "not_confirmed"), details)
+
+
+async def _is_twin(connection: Connection, target: Target) -> bool:
+    """What it answers now counts: another device may stand behind the address since it was asked last."""
+    if DEVICE_NAME not in target.description.entries:
+        return False
+    try:
+        name = await connection.driver(target).read(target.node, DEVICE_NAME, ASK_TIMEOUT_S)
+    except HubsideError:
+        return False
+    return bool(name.startswith(TWIN_NAME.encode()))
 
 
 def _battery(seen: Testing, here: bool) -> Standing:
@@ -146,9 +200,13 @@ def _others(connection: Connection, target: Target) -> Standing:
         for line in axis_lines(connection.turbine, by_slug, connection.stamper())
         if line.station != own and _has_axis(connection, line)
     ]
-    out = [line for line in lines if line.stale or line.position_deg is None or line.position_deg < FEATHER_DEG]
+    out = [
+        line
+        for line in lines
+        if line.stale or line.position_deg is None or not FEATHER_DEG <= line.position_deg <= BEYOND_DEG
+    ]
     blades = ", ".join(str(line.blade) for line in out) or "–"
-    return Standing(Interlock.OTHERS_FEATHERED, bool(out), {"blades": blades, "angle": FEATHER_DEG})
+    return Standing(Interlock.OTHERS_FEATHERED, bool(out), {"blades": blades, "angle": FEATHER_DEG, "most": BEYOND_DEG})
 
 
 def _has_axis(connection: Connection, line: AxisLine) -> bool:
@@ -163,7 +221,8 @@ def _rules(targets: Iterable[Target], target: Target) -> Standing:
 
 async def _restore(connection: Connection, target: Target) -> Standing:
     try:
-        await target.pass_gate(connection.driver(target))
+        await target.require_no_restore(connection.driver(target))
+        target.gate.claims.require_unclaimed(target.slug)
     except HubsideError:
         return Standing(Interlock.NO_RESTORE, True, {})
     return Standing(Interlock.NO_RESTORE, False, {})

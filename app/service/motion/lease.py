@@ -52,9 +52,9 @@ class Lease:
         self.wish: Wish | None = None
 
     def take(self, person: str, page: str) -> Holder:
-        """Have the lease, or keep it. Raises LeaseHeldError where another page has it."""
+        """Have the lease, or keep it. Raises LeaseHeldError where another page or another person has it."""
         holder = self.holder
-        if holder is not None and holder.page != page:
+        if holder is not None and (holder.page, holder.person) != (page, person):
             raise LeaseHeldError(holder=holder.person)
         if holder is not None:
             return self._used(holder)
@@ -65,10 +65,10 @@ class Lease:
 
         Raises LeaseHeldError where somebody else is already asking.
         """
-        if self.holder is None or self.holder.page == page:
+        if self.holder is None or (self.holder.page, self.holder.person) == (page, person):
             self.take(person, page)
             return None
-        if self.wish is not None and self.wish.page != page:
+        if self.wish is not None and (self.wish.page, self.wish.person) != (page, person):
             raise LeaseHeldError(holder=self.wish.person)
         self.refused = None
         if self.wish is None:

@@ -21,10 +21,10 @@ class LeaseLine:
 
 @dataclass(frozen=True, slots=True)
 class PreparedLine:
-    """An axis that may move: so long after our last heartbeat it had stopped by itself."""
+    """An axis that may move: so long after our last heartbeat it had stopped by itself; None where it does not."""
 
     device: str
-    proof_ms: int
+    proof_ms: int | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,8 +49,9 @@ class EndedLine:
 class MotionLine:
     """``available`` False: nothing is connected that could move, or this is a recording.
 
-    ``refused``: the page whose wish for the lease was refused last. ``left``: devices where settings still stand that
-    were changed for motion, by a server that was killed or a bus that was lost.
+    ``refused``: the page whose wish for the lease was refused last. ``external_stops``: devices whose stop by hand an
+    expert answers for. ``left``: devices where settings still stand that were changed for motion, by a server that was
+    killed or a bus that was lost.
     """
 
     available: bool
@@ -59,13 +60,14 @@ class MotionLine:
     refused: str | None
     rotor_locked: bool
     people_out: bool
+    external_stops: tuple[str, ...]
     prepared: tuple[PreparedLine, ...]
     left: tuple[str, ...]
     running: RunningLine | None
     ended: EndedLine | None
 
 
-NO_MOTION: Final = MotionLine(False, None, None, None, False, False, (), (), None, None)
+NO_MOTION: Final = MotionLine(False, None, None, None, False, False, (), (), (), None, None)
 
 
 def motion_line(desk: MotionDesk | None) -> MotionLine:
@@ -80,11 +82,8 @@ def motion_line(desk: MotionDesk | None) -> MotionLine:
         refused=desk.lease.refused,
         rotor_locked=desk.confirmed.rotor_locked,
         people_out=desk.confirmed.people_out,
-        prepared=tuple(
-            PreparedLine(slug, round(1000 * axis.proof_s))
-            for slug, axis in desk.prepared.items()
-            if axis.proof_s is not None
-        ),
+        external_stops=tuple(sorted(desk.confirmed.external_stops)),
+        prepared=tuple(PreparedLine(slug, axis.proof_ms) for slug, axis in desk.prepared.items() if axis.may_move),
         left=tuple(slug for slug in desk.left.devices if slug not in desk.prepared),
         running=None if running is None else RunningLine(running.slug, running.doing.value),
         ended=None

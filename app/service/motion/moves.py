@@ -1,18 +1,30 @@
-"""What an axis can be told to do at the desk: jog, move to an angle, be held enabled, home, reset its fault."""
+"""What an axis can be told to do at the desk: jog, move to a position, be held enabled, home, reset its fault.
+
+Positions and speeds are in the units of 607Ah and 60FFh: degrees and degrees a second at a blade.
+"""
 
 from __future__ import annotations
 
 import asyncio
+from math import inf
 from typing import Final
 
-from app.errors import LimitError, UnverifiedError
+from app.errors import UnverifiedError, UsageError
 from app.model.address import Address
 from app.model.axis_state import AxisState
 from app.model.checks import Allow
 from app.model.datatypes import Raw
 from app.model.values import parse
-from app.service.devices import Target
 from app.service.journal import Journal, Kind
+from app.service.motion.bounds import (
+    TARGET_POSITION,
+    TARGET_VELOCITY,
+    ends_of,
+    require_by_hand,
+    require_speed,
+    require_within,
+    way_per_s,
+)
 from app.service.motion.control import (
     ACKNOWLEDGED,
     TARGET_REACHED,
@@ -21,17 +33,13 @@ from app.service.motion.control import (
     Word,
 )
 from app.service.motion.desk import Doing, Ended, MotionDesk, Running
+from app.service.motion.home_methods import searches
 from app.service.motion.interlocks import POSITION
 from app.service.write import know_what_it_rests_on, write_raw
 
-TARGET_POSITION: Final = Address(0x607A)
-TARGET_VELOCITY: Final = Address(0x60FF)
 PROFILE_VELOCITY: Final = Address(0x6081)
-LOWEST: Final = Address(0x607D, 1)
-HIGHEST: Final = Address(0x607D, 2)
-MOST_DPS: Final = 5.0
-"""The fastest that a person moves a blade by hand."""
-STOPPING: Final = (Ended.SILENT, Ended.LEASE, Ended.LINK)
+WINDOW: Final = Address(0x6067)
+STOPPING: Final = (Ended.SILENT, Ended.LEASE, Ended.LINK, Ended.INTERLOCK)
 """A quick stop is under way."""
 _LOOK_S: Final = 0.02
 _HOME_TOLERANCE_DEG: Final = 0.1
@@ -39,16 +47,17 @@ _MARGIN_S: Final = 0.25
 """A jog ends so long before the software limit: what the ramp and the last look take."""
 
 
-async def jog(desk: MotionDesk, slug: str, fence: int, speed_dps: float, journal: Journal) -> None:
-    """Turn the blade at a constant speed (profile velocity) as long as it is held, up to the software limits.
+async def jog(desk: MotionDesk, slug: str, fence: int, speed: float, journal: Journal) -> None:
+    """Turn the axis at a constant speed (profile velocity) as long as it is held, up to the software limits.
 
-    Degrees per second, negative towards 0. Raises LimitError, and what ``MotionDesk.move`` raises.
+    At a blade negative is towards 0. Raises LimitError, and what ``MotionDesk.move`` raises.
     """
-    _require_speed(speed_dps)
+    require_by_hand(desk.connection, desk.connection.target(slug), speed)
 
     async def work(running: Running) -> None:
         control = running.control
-        raw = await raw_of(control, TARGET_VELOCITY, speed_dps)
+        await require_speed(desk.connection, control, speed)
+        raw = await raw_of(control, TARGET_VELOCITY, speed)
         await control.set_mode(AxisMode.PROFILE_VELOCITY)
         await set_object(control, TARGET_VELOCITY, raw, journal)
         if running.over.is_set():
@@ -57,40 +66,40 @@ async def jog(desk: MotionDesk, slug: str, fence: int, speed_dps: float, journal
             await control.enable()
             if not running.over.is_set():
                 running.turning = True
-                control.word(Word.RUN)
-                await _until_limit(running, speed_dps)
+                await control.say(Word.RUN)
+                await _until_limit(running, speed)
         finally:
             await come_to_rest(running)
 
     await desk.move(slug, fence, Doing.JOG, work)
 
 
-async def move_to(
-    desk: MotionDesk, slug: str, fence: int, angle_deg: float, speed_dps: float, journal: Journal
-) -> None:
-    """Move the blade to an angle (profile position) while it is held; let go, it halts on its way.
+async def move_to(desk: MotionDesk, slug: str, fence: int, position: float, speed: float, journal: Journal) -> None:
+    """Move the axis to a position (profile position) while it is held; let go, it halts on its way.
 
     Raises LimitError, and what ``MotionDesk.move`` raises.
     """
-    _require_speed(speed_dps)
+    require_by_hand(desk.connection, desk.connection.target(slug), speed)
 
     async def work(running: Running) -> None:
         control = running.control
-        await _require_within(control, angle_deg)
+        await require_speed(desk.connection, control, speed)
+        await require_within(control, position)
         await control.set_mode(AxisMode.PROFILE_POSITION)
-        await set_object(control, PROFILE_VELOCITY, await raw_of(control, PROFILE_VELOCITY, abs(speed_dps)), journal)
-        await set_object(control, TARGET_POSITION, await raw_of(control, TARGET_POSITION, angle_deg), journal)
+        await set_object(control, PROFILE_VELOCITY, await raw_of(control, PROFILE_VELOCITY, abs(speed)), journal)
+        await set_object(control, TARGET_POSITION, await raw_of(control, TARGET_POSITION, position), journal)
         if running.over.is_set():
             return
         try:
             await control.enable()
             if not running.over.is_set():
                 running.turning = True
-                control.word(Word.RUN)
-                control.word(Word.NEW_SET_POINT)
-                await control.until_bits(ACKNOWLEDGED, True)
+                await control.say(Word.RUN)
+                await control.say(Word.NEW_SET_POINT)
                 if not running.over.is_set():
-                    control.word(Word.RUN)
+                    await control.until_bits(ACKNOWLEDGED, True)
+                if not running.over.is_set():
+                    await control.say(Word.RUN)
                     await _until_reached(running)
         finally:
             await come_to_rest(running)
@@ -128,25 +137,28 @@ async def hold(desk: MotionDesk, slug: str, fence: int) -> None:
     await desk.move(slug, fence, Doing.HOLD, work)
 
 
-async def home(desk: MotionDesk, slug: str, fence: int, angle_deg: float, journal: Journal) -> None:
-    """Take the present position of an axis without power for ``angle_deg`` (homing method 35, manual 5.14).
+async def home(desk: MotionDesk, slug: str, fence: int, position: float, journal: Journal) -> None:
+    """Take the present position of an axis without power for ``position`` (homing method 35, OAT manual 5.14).
 
     Raises what ``MotionDesk.move`` raises, AxisStateError where the axis has power, moves or does not confirm it,
     UnverifiedError where it stands elsewhere by its own word: the bits that confirm may be those of an earlier time.
+    UsageError where the drive looks for its home by itself (``homing.search_home``).
     """
+    if searches(desk.connection.target(slug)):
+        raise UsageError(reason=f"{slug} is homed by a method of 6098h")
 
     async def work(running: Running) -> None:
         control = running.control
         await control.require_at_rest()
         await control.set_mode(AxisMode.HOMING)
-        await set_object(control, TARGET_POSITION, await raw_of(control, TARGET_POSITION, angle_deg), journal)
-        control.word(Word.SHUTDOWN)
+        await set_object(control, TARGET_POSITION, await raw_of(control, TARGET_POSITION, position), journal)
+        await control.say(Word.SHUTDOWN)
         await control.until({AxisState.READY})
-        control.word(Word.HOME)
+        await control.say(Word.HOME)
         await control.until_bits(ACKNOWLEDGED | TARGET_REACHED, True)
-        control.word(Word.SHUTDOWN)
-        await _require_at(control, angle_deg)
-        journal.note(Kind.HOMED, slug, angle_deg=angle_deg)
+        await control.say(Word.SHUTDOWN)
+        await _require_at(control, position)
+        journal.note(Kind.HOMED, slug, angle_deg=position)
 
     await desk.move(slug, fence, Doing.HOMING, work, held=False)
 
@@ -169,13 +181,14 @@ async def _go_on(running: Running) -> None:
         await wait(running)
 
 
-async def _until_limit(running: Running, speed_dps: float) -> None:
-    """Wait until it is let go, or until the blade comes near the limit towards which it turns."""
+async def _until_limit(running: Running, speed: float) -> None:
+    """Wait until it is let go, or until the axis comes near the limit towards which it turns."""
     control = running.control
-    low_deg, high_deg = await control.degrees(LOWEST), await control.degrees(HIGHEST)
+    low, high = await ends_of(control)
+    margin = way_per_s(control.target, speed) * _MARGIN_S if (low, high) != (-inf, inf) else 0.0
     while not running.over.is_set():
-        ahead_deg = await control.degrees(POSITION) + speed_dps * _MARGIN_S
-        if (speed_dps < 0 and ahead_deg <= low_deg) or (speed_dps > 0 and ahead_deg >= high_deg):
+        ahead = await control.scaled(POSITION) + margin
+        if (speed < 0 and ahead <= low) or (speed > 0 and ahead >= high):
             running.end(Ended.LIMIT)
             return
         await _go_on(running)
@@ -186,10 +199,18 @@ async def _until_reached(running: Running) -> None:
         status = await running.control.status()
         if running.control.overtaken or AxisState.of(status) is not AxisState.OPERATION_ENABLED:
             running.end(Ended.STOPPED)
-        elif status & TARGET_REACHED and not status & ACKNOWLEDGED:
+        elif status & TARGET_REACHED and not status & ACKNOWLEDGED and await _is_there(running.control):
             running.end(Ended.DONE)
         else:
             await wait(running)
+
+
+async def _is_there(control: Control) -> bool:
+    """Within the position window (6067h): bit 10 may still be that of the target before."""
+    if WINDOW not in control.target.description.entries:
+        return True
+    far = abs(await control.number(POSITION) - await control.number(TARGET_POSITION))
+    return far <= await control.number(WINDOW)
 
 
 async def wait(running: Running) -> None:
@@ -212,16 +233,16 @@ async def come_to_rest(running: Running, halt: bool = True) -> None:
         return
     if running.why is Ended.STOPPED:
         if await control.state() is AxisState.SWITCHED_ON:
-            control.word(Word.SHUTDOWN)
+            await control.say(Word.SHUTDOWN)
     elif halt:
-        control.word(Word.HALT if running.turning else Word.SHUTDOWN)
+        await control.say(Word.HALT if running.turning else Word.SHUTDOWN)
     await control.until_still()
     running.turning = False
     await control.switch_off()
 
 
 async def _require_at(control: Control, angle_deg: float) -> None:
-    found_deg = await control.degrees(POSITION)
+    found_deg = await control.scaled(POSITION)
     if abs(found_deg - angle_deg) > _HOME_TOLERANCE_DEG:
         raise UnverifiedError(
             address=POSITION.short,
@@ -243,33 +264,3 @@ async def raw_of(control: Control, address: Address, number: float) -> Raw:
     entry = target.entry(address)
     await know_what_it_rests_on(control.driver, target, entry)
     return parse(target.description, entry, f"{number:.3f}".rstrip("0").rstrip("."), target.lookup)
-
-
-async def _require_within(control: Control, angle_deg: float) -> None:
-    """Raises LimitError: the drive would adjust a target outside its limits and go there (manual 5.10)."""
-    low_deg, high_deg = await control.degrees(LOWEST), await control.degrees(HIGHEST)
-    if not low_deg <= angle_deg <= high_deg:
-        raise _beyond(control.target, TARGET_POSITION, angle_deg, low_deg, high_deg)
-
-
-def _beyond(target: Target, address: Address, number: float, low: float, high: float) -> LimitError:
-    return LimitError(
-        address=address.short,
-        name=target.entry(address).title,
-        value=f"{number:g}",
-        minimum=f"{low:g}",
-        maximum=f"{high:g}",
-        unit="°",
-    )
-
-
-def _require_speed(speed_dps: float) -> None:
-    if not 0 < abs(speed_dps) <= MOST_DPS:
-        raise LimitError(
-            address=TARGET_VELOCITY.short,
-            name="",
-            value=f"{speed_dps:g}",
-            minimum=-MOST_DPS,
-            maximum=MOST_DPS,
-            unit="°/s",
-        )

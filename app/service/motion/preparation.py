@@ -23,7 +23,7 @@ from app.errors import (
     OvertakenError,
 )
 from app.model.address import Address
-from app.model.axis_state import AxisState
+from app.model.axis_state import ENERGISED, AxisState
 from app.model.checks import Allow
 from app.service.devices import decode
 from app.service.journal import Journal, Kind
@@ -55,14 +55,30 @@ _NMT_TIMEOUT_S: Final = 2.0
 
 @dataclass
 class Prepared:
-    """An axis that may move. ``settings``: what must stand there.
+    """An axis that is prepared. ``settings``: what must stand there.
 
     ``proof_s``: so long after our last heartbeat it had left operation enabled by itself; None: not proven yet.
+    ``unwatched``: its bus has nothing by which it could, and it may move all the same (``Interlock.SELF_STOP``).
     """
 
     control: Control
     settings: dict[Address, bytes] = field(default_factory=dict)
     proof_s: float | None = None
+    unwatched: bool = False
+
+    @property
+    def may_move(self) -> bool:
+        """What has to be known of it is."""
+        return self.unwatched or self.proof_s is not None
+
+    @property
+    def proof_ms(self) -> int | None:
+        """``proof_s`` in ms."""
+        return None if self.proof_s is None else round(1000 * self.proof_s)
+
+    def void(self) -> None:
+        """It must not move before it is prepared anew."""
+        self.proof_s, self.unwatched = None, False
 
     @property
     def slug(self) -> str:
@@ -90,6 +106,20 @@ async def set_up(axis: Prepared, heartbeat: Heartbeat, left: Left, journal: Jour
         control.driver.nmt(NmtCommand.START, control.target.node)
         journal.note(Kind.NMT_SENT, axis.slug, command="start", was=_name(state))
         await _until_operational(control)
+
+
+async def take_unwatched(axis: Prepared, heartbeat: Heartbeat, left: Left) -> None:
+    """Have an axis that cannot watch us ready to move: only its mode is noted, for nothing is set.
+
+    Raises InterlockError where it has power: somebody else has it. And what reading raises, StoreError.
+    """
+    control = axis.control
+    await left.note_mode(axis.slug, await control.number(MODE_SHOWN))
+    if await control.state() in ENERGISED:
+        raise InterlockError(device=axis.slug, interlock="running", reason_key="interlock.reason.has_power")
+    control.require_own()
+    heartbeat.watch(axis.slug)
+    axis.unwatched = True
 
 
 async def _free_consumer(control: Control, node: int) -> Address:
@@ -147,8 +177,7 @@ async def prove(axis: Prepared, heartbeat: Heartbeat, held: Callable[[], bool]) 
     Raises InterlockError where it went on, NotHeldError where it was let go meanwhile.
     """
     control = axis.control
-    loop = asyncio.get_running_loop()
-    axis.proof_s = None
+    axis.void()
     await control.set_mode(AxisMode.PROFILE_VELOCITY)
     try:
         await control.enable()
@@ -159,10 +188,10 @@ async def prove(axis: Prepared, heartbeat: Heartbeat, held: Callable[[], bool]) 
         while await control.state() is AxisState.OPERATION_ENABLED:
             if not held():
                 raise NotHeldError(device=axis.slug)
-            if loop.time() - last_s > PROOF_S:
+            if heartbeat.now_s() - last_s > PROOF_S:
                 raise _not_proven(axis, "still_enabled", PROOF_S)
             await asyncio.sleep(_LOOK_S)
-        took_s = loop.time() - last_s
+        took_s = heartbeat.now_s() - last_s
         control.require_own()  # a STOP proves nothing
         if not held():
             raise NotHeldError(device=axis.slug)
@@ -172,7 +201,7 @@ async def prove(axis: Prepared, heartbeat: Heartbeat, held: Callable[[], bool]) 
     finally:
         heartbeat.go_on(axis.slug)
         if axis.proof_s is None and not control.stop():
-            await control.stop_by_sdo()
+            await control.stop_by_write()
     return axis.proof_s
 
 

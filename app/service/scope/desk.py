@@ -13,6 +13,7 @@ from typing import Final
 
 from app.errors import HubsideError, NotConnectedError, ScopeStateError
 from app.model.address import Address
+from app.model.description import Bus
 from app.model.sets import iso_time
 from app.service.connection import Connection
 from app.service.journal import Journal, Kind
@@ -27,7 +28,7 @@ from app.service.scope.signals import number_of
 from app.service.scope.tap import Heard, Tap
 from app.service.scope.trigger import Happened, What
 from app.store.uuid7 import Uuid7
-from app.wire.records import BootUpSeen, EmcySeen, GapSeen, Source, ValueSeen
+from app.wire.records import BootUpSeen, EmcySeen, GapSeen, RestartSeen, Source, ValueSeen
 
 log = logging.getLogger(__name__)
 
@@ -107,7 +108,7 @@ class ScopeDesk:
             self.run = run
             for link in connection.buses.values():
                 link.listen(run.tap.hear)
-            run.sampling = Sampling(connection, _addresses(planned), self._polling)
+            run.sampling = Sampling(connection, _addresses(planned, connection), self._polling)
             run.ticker = asyncio.create_task(self._tick_forever(run))
             self._journal.by(person).note(Kind.SCOPE_ARMED, None, signals=len(planned.signals))
             return run
@@ -161,6 +162,7 @@ class ScopeDesk:
         if run.over:
             return
         engine, sources, types = run.engine, run.plan.sources, run.plan.types
+        unasked = {bus for bus, link in run.connection.buses.items() if link.kind is Bus.CANOPEN}
         for one in heard:
             if type(one) is ValueSeen:
                 source = sources[(one.bus, one.node, one.address)]  # type: ignore[index]  # equal to a Place
@@ -168,7 +170,7 @@ class ScopeDesk:
                 if raw is None:
                     run.unreadable += 1
                 else:
-                    engine.value(source, one.t_ns, raw, one.source in _PDOS)
+                    engine.value(source, one.t_ns, raw, one.source in _PDOS and one.bus in unasked)
             elif isinstance(one, GapSeen):
                 engine.gap(one.t_ns, one.bus, one.reason)
             else:
@@ -328,7 +330,7 @@ def _looked_up(frozen: Sequence[Frozen]) -> tuple[list[InForce], tuple[KeptDevic
 def _happened(one: Heard) -> Happened:
     if isinstance(one, EmcySeen):
         return Happened(one.t_ns, What.EMCY, one.bus, one.node, code=one.code)
-    if isinstance(one, BootUpSeen):
+    if isinstance(one, BootUpSeen | RestartSeen):
         return Happened(one.t_ns, What.BOOT_UP, one.bus, one.node)
     return Happened(one.t_ns, What.NMT, one.bus, one.node, state=getattr(one, "state", None))
 
@@ -345,11 +347,18 @@ def _count(head: Head) -> int:
     return sum(one.count for one in head.signals)
 
 
-def _addresses(planned: Plan) -> dict[str, list[Address]]:
-    """What is shown of each device."""
+def _addresses(planned: Plan, connection: Connection) -> dict[str, list[Address]]:
+    """What is shown of each device, and what triggers where devices send nothing unasked."""
     found: dict[str, list[Address]] = {}
-    for one in planned.signals:
-        own = found.setdefault(one.device, [])
-        if one.place.address not in own:
-            own.append(one.place.address)
+    shown = [(one.device, one.place) for one in planned.signals]
+    asked = [
+        (target.slug, place)
+        for target in connection.targets
+        for place in planned.sources
+        if connection.buses[place.bus].kind is not Bus.CANOPEN and place[:2] == (target.device.bus, target.node)
+    ]
+    for device, place in (*shown, *asked):
+        own = found.setdefault(device, [])
+        if place.address not in own:
+            own.append(place.address)
     return found

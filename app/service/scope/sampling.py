@@ -1,16 +1,24 @@
-"""While a scope is armed: what no PDO carries of its signals is read by SDO, as fast as the cap on the load allows."""
+"""While a scope is armed: what nothing brings unasked of its signals is read, as fast as the cap on the load allows.
+
+On CAN that is what no PDO carries. A drive on Modbus TCP sends nothing unasked: what it maps into its registers comes
+in one message, the rest object by object.
+"""
 
 from __future__ import annotations
 
 import asyncio
+import logging
 from collections.abc import Callable, Collection, Mapping
 from typing import Final
 
+from app.errors import HubsideError
 from app.model.address import Address
 from app.service.connection import Connection
 from app.service.devices import Target
 from app.service.poll import LOOK_S, Poller, is_lasting
 from app.service.polling import PollPlan, read_bits
+
+log = logging.getLogger(__name__)
 
 LEAST_S: Final = 0.002
 """A round never takes less, so that others get their turn."""
@@ -51,6 +59,26 @@ class Sampling(Poller):
             await asyncio.sleep(max(LEAST_S, pause_s))
             own = bits / self._bitrate(target) / max(LEAST_S, loop.time() - begun_s)
 
+    async def _read(self, target: Target, wanted: list[Address]) -> dict[Address, bytes | HubsideError]:
+        mapped = await self._registers(target, wanted)
+        rest = [address for address in wanted if address not in mapped]
+        return {**mapped, **await super()._read(target, rest)}
+
+    async def _registers(self, target: Target, wanted: Collection[Address]) -> dict[Address, bytes | HubsideError]:
+        """What registers hold of ``wanted``; nothing where the bus has none, or they cannot be read just now."""
+        process_data = getattr(self._connection.driver(target), "process_data", None)
+        if process_data is None:
+            return {}
+        process = process_data(target.node)
+        try:
+            if (await process.images()).sent.places.keys().isdisjoint(wanted):
+                return {}
+            found = await process.exchange()
+        except HubsideError as error:
+            log.debug("registers of %s: %s", target.slug, error.code)
+            return {}
+        return {address: data for address, data in found.items() if address in wanted}
+
     def _round_s(self, target: Target, cap: float, bits: int, own: float) -> float:
         """How long a round should take so that the load stays under its cap. ``own``: the share we take now."""
         link = self._connection.buses[target.device.bus]
@@ -59,4 +87,4 @@ class Sampling(Poller):
         return bits / (self._bitrate(target) * max(LEAST_ROOM, (cap - others) / sharing))
 
     def _bitrate(self, target: Target) -> int:
-        return self._connection.buses[target.device.bus].bitrate
+        return self._connection.buses[target.device.bus].load.bitrate

@@ -15,12 +15,12 @@ from threading import Lock
 from typing import Final
 
 from app.service.scope.signals import Place
-from app.wire.records import BootUpSeen, EmcySeen, GapSeen, Record, Source, StateSeen, ValueSeen
+from app.wire.records import BootUpSeen, EmcySeen, GapSeen, Record, RestartSeen, Source, StateSeen, ValueSeen
 
 log = logging.getLogger(__name__)
 
-Heard = ValueSeen | EmcySeen | BootUpSeen | StateSeen | GapSeen
-_EVENTS: Final = frozenset({EmcySeen, BootUpSeen, StateSeen, GapSeen})
+Heard = ValueSeen | EmcySeen | BootUpSeen | RestartSeen | StateSeen | GapSeen
+_EVENTS: Final = frozenset({EmcySeen, BootUpSeen, RestartSeen, StateSeen, GapSeen})
 MAX_QUEUED: Final = 200_000
 """Records that wait for the event loop. More are let go, and the capture has a gap."""
 PORTION: Final = 1000

@@ -12,12 +12,14 @@ from typing import Final
 
 from app.model.description import Description
 from app.wire.decoder import CanOpenDecoder
+from app.wire.decoders import BusDecoder
 from app.wire.frame import Frame
 from app.wire.records import EmcySeen, Outcome, Record, SdoAccess, SdoSeen
 from app.wire.trace.ids import Identifiers, IdentifierView
+from app.wire.trace.modbus_tracer import ModbusTracer
 from app.wire.trace.ring import Chunk, FrameRing
-from app.wire.trace.service import Speaker
-from app.wire.trace.tracer import Gap, Item, Tracer
+from app.wire.trace.service import UNKNOWN, Speaker
+from app.wire.trace.tracer import Gap, Item, Tracer, Tracing
 
 MAX_TRANSFERS: Final = 5000
 MAX_EMERGENCIES: Final = 2000
@@ -26,15 +28,17 @@ MAX_EMERGENCIES: Final = 2000
 class BusTrace:
     """The trace of the bus ``bus``, which ``decoder`` follows; ``lock`` is held by the receive thread.
 
-    ``epoch`` is raised when a node turns out to be another device: then tracers must be made anew.
+    ``servers``: ``host:port`` by node, where it is a Modbus TCP bus. ``epoch`` is raised when a node turns out to be
+    another device: then tracers must be made anew.
     """
 
-    def __init__(self, bus: str, decoder: CanOpenDecoder, lock: Lock) -> None:
+    def __init__(self, bus: str, decoder: BusDecoder, lock: Lock, servers: Mapping[int, str] | None = None) -> None:
         self.bus = bus
         self.epoch = 0
         self.sdo_count: dict[int, int] = {}
         """Transfers by node since the connection was opened."""
         self._decoder = decoder
+        self._servers = servers
         self._lock = lock
         self._descriptions: dict[int, Description] = {}
         self._identifiers = Identifiers()
@@ -82,15 +86,19 @@ class BusTrace:
         with self._lock:
             return self._ring.since(number)
 
-    def tracer(self) -> Tracer:
+    def tracer(self) -> Tracing:
         """One that begins anywhere: give it the snapshot of a chunk by ``restart``."""
+        if self._servers is not None:
+            return ModbusTracer(self.bus, self._servers)
         return Tracer(self.bus, self.descriptions())
 
-    def tracer_now(self) -> tuple[Tracer, int]:
+    def tracer_now(self) -> tuple[Tracing, int]:
         """One that goes on from now, and the number of the first item that it has to take."""
         with self._lock:
             snapshot, number = self._decoder.snapshot(), self._ring.total
-        return Tracer(self.bus, self.descriptions(), snapshot), number
+        tracer = self.tracer()
+        tracer.restart(snapshot)
+        return tracer, number
 
     def descriptions(self) -> Mapping[int, Description]:
         """What stands at which node."""
@@ -98,7 +106,9 @@ class BusTrace:
             return dict(self._descriptions)
 
     def speaker(self, can_id: int, extended: bool) -> Speaker:
-        """Whose identifier this is now."""
+        """Whose CAN identifier this is now."""
+        if not isinstance(self._decoder, CanOpenDecoder):
+            return UNKNOWN
         with self._lock:
             return self._decoder.speaker(can_id, extended)
 

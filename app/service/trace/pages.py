@@ -22,7 +22,7 @@ from app.service.trace.log import BusTrace
 from app.service.trace.query import TraceQuery, filter_of
 from app.service.trace.text import Namer, TraceLine, line
 from app.wire.trace.filter import TraceFilter
-from app.wire.trace.tracer import Item, Tracer, TraceRow
+from app.wire.trace.tracer import Item, TraceRow, Tracing
 
 MAX_SCANNED: Final = 50_000
 """Items looked at for one page, a bus: with a filter that hardly anything passes, the page says how far it got."""
@@ -178,12 +178,15 @@ class TracePages:
         """Rows from ``from_ns`` on and before ``to_ns``, decoded from the last keyframe before."""
         keyframe = _keyframe(recording, from_ns)
         states: Mapping[str, Any] = {} if keyframe is None else keyframe.state.get("decoders", {})
-        tracers = {trace.bus: Tracer(trace.bus, trace.descriptions(), states.get(trace.bus)) for trace in self._traces}
+        tracers = {trace.bus: trace.tracer() for trace in self._traces}
+        for bus, tracer in tracers.items():
+            if bus in states:
+                tracer.restart(states[bus])
         for frame in recording.frames(None if keyframe is None else keyframe.t_ns + 1, to_ns):
-            tracer = tracers.get(frame.bus)
-            if tracer is None:
+            of_bus = tracers.get(frame.bus)
+            if of_bus is None:
                 continue
-            row = tracer.take(frame)
+            row = of_bus.take(frame)
             if frame.t_ns >= from_ns:
                 yield row
 
@@ -241,7 +244,7 @@ def _ring_after(trace: BusTrace, wanted: TraceFilter, t_ns: int, limit: int) -> 
     return _Found(rows, False, chunks[-1].end_ns if chunks else None)
 
 
-def _rows_until(tracer: Tracer, items: Iterable[Item], t_ns: int) -> Iterator[TraceRow]:
+def _rows_until(tracer: Tracing, items: Iterable[Item], t_ns: int) -> Iterator[TraceRow]:
     for item in items:
         if item[0] >= t_ns:
             return

@@ -10,6 +10,7 @@ from app.model.address import Address
 from app.service.bus_feed import BusFeed
 from app.service.stage import Stage
 from app.service.trace.text import Namer, TraceItem, abort_details, emcy_details
+from app.service.views import is_managed
 from app.wire.busload import EXTENDED_KEY
 from app.wire.emcy import NO_ERROR
 from app.wire.frame import Can, Direction
@@ -26,8 +27,9 @@ Transfers = Literal["all", "writes", "failed"]
 class BusNode:
     """One node that was seen, or that the site names. ``nmt`` is the text key of its state.
 
-    ``device_name`` is what it said of itself (1008h). ``sdo_per_node`` counts transfers; ``other_client_t_ns`` is the
-    latest one that was not ours.
+    ``device_name`` is what it said of itself (1008h). Not ``managed``: its bus has neither states nor heartbeats; then
+    ``answered_t_ns``, its latest answer to anybody, tells that it is there. ``sdo_count`` counts transfers;
+    ``other_client_t_ns`` is the latest one that was not ours.
     """
 
     bus: str
@@ -48,6 +50,8 @@ class BusNode:
     sdo_count: int
     sdo_t_ns: int | None
     other_client_t_ns: int | None
+    managed: bool
+    answered_t_ns: int | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,6 +181,8 @@ def _node(
         sdo_count=link.trace.sdo_count.get(node, 0),
         sdo_t_ns=None if last is None else last.t_ns,
         other_client_t_ns=known.other_client_ns,
+        managed=target is None or is_managed(target),
+        answered_t_ns=known.answered_ns,
     )
 
 

@@ -12,7 +12,7 @@ from app.service.trace.log import BusTrace
 from app.service.trace.query import TraceQuery, filter_of
 from app.service.trace.text import Namer, TraceLine, line
 from app.wire.trace.filter import TraceFilter
-from app.wire.trace.tracer import Tone, Tracer, TraceRow
+from app.wire.trace.tracer import Tone, TraceRow, Tracing
 
 PERIOD_S: Final = 0.1
 MAX_ROWS: Final = 100
@@ -60,7 +60,7 @@ class _BusTail:
         self._next = first + len(items)
         return missed, list(self._tracer.rows(items))
 
-    def _resumed(self, first: int) -> Tracer:
+    def _resumed(self, first: int) -> Tracing:
         tracer = self._trace.tracer()
         for chunk in self._trace.chunks():
             if chunk.first == first:

@@ -11,19 +11,25 @@ from app.model.description import Description, Entry, Kind
 from app.model.values import quantity_of, show
 from app.service.devices import Target, decode
 from app.wire.emcy import NO_ERROR, emcy_text_key
-from app.wire.frame import Can, Frame
+from app.wire.frame import Adu, Can, Frame
+from app.wire.modbus.functions import exception_text_key
+from app.wire.modbus.transactions import ARROW
 from app.wire.records import (
     BootUpSeen,
     EmcySeen,
     EnvironmentSeen,
     GapSeen,
+    MalformedAduSeen,
     MalformedSeen,
     NmtCommandSeen,
     OrphanSeen,
     Outcome,
+    RestartSeen,
     SdoSeen,
+    Source,
     StateSeen,
     SyncSeen,
+    TransactionSeen,
     ValueSeen,
 )
 from app.wire.sdo import abort_text_key
@@ -33,6 +39,8 @@ from app.wire.trace.tracer import Step, TraceRow, direction_of
 ToneName = Literal["plain", "warning", "error"]
 DirectionName = Literal["rx", "tx"]
 _PDO: Final = (Service.TPDO, Service.RPDO)
+_CARRYING: Final = (*_PDO, Service.MODBUS_RESPONSE)
+"""Services of which one frame carries many objects."""
 _MAX_BYTES: Final = 64
 """Of a value that is shown as bytes."""
 
@@ -64,7 +72,11 @@ class TraceNote:
 
 @dataclass(frozen=True, slots=True)
 class TraceLine:
-    """One frame, or a gap in the traffic. ``start_t_ns``: the first request of the transfer that this frame ended."""
+    """One frame, or a gap in the traffic. ``start_t_ns``: the first request of the transfer that this frame ended.
+
+    Of Modbus TCP ``transaction`` is set, ``peer`` is the client's end of the connection, ``number`` the function
+    code and ``dlc`` the bytes of the ADU; ``can_id`` is 0.
+    """
 
     t_ns: int
     bus: str
@@ -84,6 +96,8 @@ class TraceLine:
     notes: tuple[TraceNote, ...]
     tone: ToneName
     start_t_ns: int | None
+    transaction: int | None
+    peer: str | None
 
 
 class Namer:
@@ -143,7 +157,8 @@ def line(row: TraceRow, namer: Namer) -> TraceLine:
     """A row for the page."""
     item, speaker = row.item, row.speaker
     can = item.payload if isinstance(item, Frame) and isinstance(item.payload, Can) else Can(0)
-    ended = row.done
+    adu = item.payload if isinstance(item, Frame) and isinstance(item.payload, Adu) else None
+    took_ns = row.took_ns
     return TraceLine(
         t_ns=item.t_ns,
         bus=item.bus,
@@ -151,8 +166,8 @@ def line(row: TraceRow, namer: Namer) -> TraceLine:
         can_id=can.can_id,
         extended=can.extended,
         remote=can.remote,
-        dlc=can.length,
-        data=can.data.hex(),
+        dlc=can.length if adu is None else len(adu.data),
+        data=(can if adu is None else adu).data.hex(),
         t_adapter_ns=item.t_adapter_ns if isinstance(item, Frame) else None,
         service=speaker.service.value,
         number=speaker.number,
@@ -162,8 +177,18 @@ def line(row: TraceRow, namer: Namer) -> TraceLine:
         items=tuple(items_of(row, namer)),
         notes=tuple(notes_of(row, namer)),
         tone=row.tone.value,
-        start_t_ns=None if ended is None else item.t_ns - ended.dt_ns,
+        start_t_ns=None if took_ns is None else item.t_ns - took_ns,
+        transaction=None if adu is None else int.from_bytes(adu.data[:2], "big"),
+        peer=None if adu is None else _peer(adu, speaker.service),
     )
+
+
+def _peer(adu: Adu, service: Service) -> str:
+    """The client's end of the connection, empty where the link does not name it."""
+    sender, arrow, receiver = adu.link.partition(ARROW)
+    if not arrow:
+        return ""
+    return receiver if service is Service.MODBUS_RESPONSE else sender
 
 
 def items_of(row: TraceRow, namer: Namer) -> Iterable[TraceItem]:
@@ -171,10 +196,11 @@ def items_of(row: TraceRow, namer: Namer) -> Iterable[TraceItem]:
     bus, node = row.item.bus, row.speaker.node
     if row.address is not None:
         yield namer.item(bus, node, row.address, row.value)
-    elif row.speaker.service in _PDO:
-        for record in row.records:
-            if isinstance(record, ValueSeen) and record.node == node:
-                yield namer.item(bus, node, record.address, record.data)
+    elif row.speaker.service in _CARRYING:
+        values = [record for record in row.records if isinstance(record, ValueSeen) and record.node == node]
+        # Of an exchange both ways what the device gave comes first: what was written is known from before.
+        for record in sorted(values, key=lambda one: one.source is Source.PDO_RX):
+            yield namer.item(bus, node, record.address, record.data)
 
 
 def notes_of(row: TraceRow, namer: Namer) -> Iterable[TraceNote]:
@@ -182,6 +208,12 @@ def notes_of(row: TraceRow, namer: Namer) -> Iterable[TraceNote]:
     service = row.speaker.service
     if row.abort_code is not None:
         yield TraceNote("trace.note.abort", abort_details(row.abort_code))
+    if row.exception is not None:
+        details = {"code": row.exception, "reason_key": exception_text_key(row.exception)}
+        yield TraceNote("trace.note.exception", details)
+    for key, span in (("read", row.read), ("written", row.written)):
+        if span is not None:
+            yield TraceNote(f"trace.note.registers_{key}", {"first": span[0], "last": sum(span) - 1})
     for record in row.records:
         note = _NOTES.get(type(record))
         if note is not None:
@@ -266,6 +298,21 @@ def _sdo(seen: SdoSeen, row: TraceRow, _namer: Namer) -> _Notes:
         yield TraceNote("trace.note.took", {"ms": f"{seen.dt_ns / 1e6:.1f}"})
 
 
+def _transaction(seen: TransactionSeen, _row: TraceRow, _namer: Namer) -> _Notes:
+    if seen.outcome is Outcome.DONE:
+        yield TraceNote("trace.note.took", {"ms": f"{seen.dt_ns / 1e6:.1f}"})
+    elif seen.outcome is not Outcome.ABORTED:
+        yield TraceNote("trace.note.request_lost", {"function": seen.function})
+
+
+def _malformed_adu(seen: MalformedAduSeen, _row: TraceRow, _namer: Namer) -> _Notes:
+    yield TraceNote("trace.note.malformed_adu", {"reason_key": seen.fault.text_key, "offset": seen.offset})
+
+
+def _restart(_seen: RestartSeen, _row: TraceRow, _namer: Namer) -> _Notes:
+    yield TraceNote("trace.note.restart", {})
+
+
 _NOTES: Final[Mapping[type, Callable[[Any, TraceRow, Namer], _Notes]]] = {
     EmcySeen: _emcy,
     EnvironmentSeen: _environment,
@@ -275,8 +322,11 @@ _NOTES: Final[Mapping[type, Callable[[Any, TraceRow, Namer], _Notes]]] = {
     BootUpSeen: _boot_up,
     GapSeen: _gap,
     MalformedSeen: _malformed,
+    MalformedAduSeen: _malformed_adu,
     OrphanSeen: _orphan,
+    RestartSeen: _restart,
     SdoSeen: _sdo,
+    TransactionSeen: _transaction,
 }
 
 

@@ -52,12 +52,13 @@ class Session(BaseModel):
 
 
 class DeviceRef(BaseModel):
-    """One device: ``slug`` is its whole path."""
+    """One device: ``slug`` is its whole path, ``axis`` tells whether it has a controlword."""
 
     slug: str
     node: int
     description_id: str
     name: str
+    axis: bool
 
 
 class StationRef(BaseModel):
@@ -111,12 +112,16 @@ class ReadRequest(BaseModel):
 
 
 class WriteRequest(BaseModel):
-    """``raw``: a number, a text, or octets as hexadecimal digits."""
+    """``raw``: a number, a text, or octets as hexadecimal digits.
+
+    ``address_confirmed``: the person knows that the device will be found at another network address.
+    """
 
     model_config = ConfigDict(extra="forbid")
 
     address: str
     raw: StrictInt | StrictFloat | Annotated[StrictStr, Field(max_length=60_000)]
+    address_confirmed: bool = False
 
 
 class Nothing(BaseModel):

@@ -11,8 +11,11 @@ from app.service.motion.interlocks import Standing
 
 Page = Annotated[str, Field(min_length=1, max_length=64)]
 """Name that a page gives itself, new each time it is loaded."""
-Degrees = Annotated[float, Field(ge=-720, le=720, allow_inf_nan=False)]
-DegreesPerSecond = Annotated[float, Field(ge=-20, le=20, allow_inf_nan=False)]
+Position = Annotated[float, Field(ge=-2e9, le=2e9, allow_inf_nan=False)]
+"""In the unit of 607Ah: degrees at a blade."""
+Speed = Annotated[float, Field(ge=-2e9, le=2e9, allow_inf_nan=False)]
+"""In the unit of 60FFh: degrees a second at a blade."""
+Slug = Annotated[str, Field(min_length=1, max_length=200)]
 
 
 class LeaseRequest(BaseModel):
@@ -46,14 +49,17 @@ class AnswerRequest(FenceRequest):
 
 
 class ConfirmRequest(FenceRequest):
-    """What the holder has looked at."""
+    """What the holder has looked at. ``external_stops``: devices whose stop by hand an expert answers for."""
 
     model_config = ConfigDict(
-        json_schema_extra={"examples": [{"fence": 1764029382123456, "rotor_locked": True, "people_out": True}]}
+        json_schema_extra={
+            "examples": [{"fence": 1764029382123456, "rotor_locked": True, "people_out": True, "external_stops": []}]
+        }
     )
 
     rotor_locked: bool
     people_out: bool
+    external_stops: list[Slug] = Field(default=[], max_length=64)
 
 
 class OrderRequest(FenceRequest):
@@ -65,34 +71,40 @@ class OrderRequest(FenceRequest):
 
 
 class JogRequest(OrderRequest):
-    """Turn the blade at a speed while it is held; negative: towards 0 degrees."""
+    """Turn the axis at a speed while it is held; at a blade negative is towards 0 degrees."""
 
-    model_config = ConfigDict(
-        json_schema_extra={"examples": [{"fence": 1764029382123456, "order": 2, "speed_dps": -2.0}]}
-    )
+    model_config = ConfigDict(json_schema_extra={"examples": [{"fence": 1764029382123456, "order": 2, "speed": -2.0}]})
 
-    speed_dps: DegreesPerSecond
+    speed: Speed
 
 
 class MoveRequest(OrderRequest):
-    """Move the blade to an angle while it is held."""
+    """Move the axis to a position while it is held."""
 
     model_config = ConfigDict(
-        json_schema_extra={"examples": [{"fence": 1764029382123456, "order": 3, "angle_deg": 45.0, "speed_dps": 2.0}]}
+        json_schema_extra={"examples": [{"fence": 1764029382123456, "order": 3, "position": 45.0, "speed": 2.0}]}
     )
 
-    angle_deg: Degrees
-    speed_dps: DegreesPerSecond
+    position: Position
+    speed: Speed
 
 
 class HomeRequest(OrderRequest):
-    """Take the present position for this angle."""
+    """Take the present position for this one."""
 
     model_config = ConfigDict(
-        json_schema_extra={"examples": [{"fence": 1764029382123456, "order": 4, "angle_deg": 90.0}]}
+        json_schema_extra={"examples": [{"fence": 1764029382123456, "order": 4, "position": 90.0}]}
     )
 
-    angle_deg: Degrees
+    position: Position
+
+
+class SearchHomeRequest(OrderRequest):
+    """Home by a method of 6098h while it is held."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [{"fence": 1764029382123456, "order": 5, "method": 17}]})
+
+    method: int = Field(ge=-128, le=127)
 
 
 class InterlockDoc(BaseModel):
@@ -109,15 +121,21 @@ class InterlockDoc(BaseModel):
 
 
 class PreparedDoc(BaseModel):
-    """The proof: so long after our last heartbeat the axis had stopped by itself."""
+    """The proof: so long after our last heartbeat the axis had stopped by itself; null where its bus has none."""
 
-    proof_ms: int
+    proof_ms: int | None
 
 
 class MovedDoc(BaseModel):
     """How it ended; the end of a text key ``motion.ended``."""
 
     why: str
+
+
+class HomedDoc(MovedDoc):
+    """Where the axis stands after homing, in the unit of 6064h."""
+
+    position: float
 
 
 class FeatheredDoc(MovedDoc):

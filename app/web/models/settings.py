@@ -12,7 +12,8 @@ from app.web.models import Failure
 Slug = Annotated[str, Field(max_length=60, pattern=r"^[a-z0-9]+(-[a-z0-9]+)*$")]
 Short = Annotated[str, Field(max_length=200)]
 Bitrate = Annotated[int, Field(ge=10_000, le=1_000_000)]
-Node = Annotated[int, Field(ge=1, le=127)]
+Node = Annotated[int, Field(ge=1, le=247)]
+"""On Modbus TCP up to 247, on CAN up to 127: the site file knows which bus it is."""
 RateName = Literal["fast", "slow", "rare"]
 VerdictName = Literal["listening", "fits", "errors", "silent"]
 HealthName = Literal["ok", "no_driver", "failed", "timed_out", "unsupported"]
@@ -77,6 +78,27 @@ class ScanRequest(BaseModel):
     connection: Short
     bitrate: Bitrate = 500_000
     consent: bool = False
+
+
+class IdentifyRequest(BaseModel):
+    """One address of Modbus TCP, HOST[:PORT][/UNIT]; a bus of the site must allow it."""
+
+    model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{"address": "192.168.2.20"}]})
+
+    address: Short
+
+
+class IdentifiedDoc(BaseModel):
+    """The device at an address, as it says itself; null where it does not say. ``twin``: it is simulated."""
+
+    address: str
+    description_id: str | None
+    variant: str | None
+    device_name: str | None
+    hardware: str | None
+    software: str | None
+    serial: str | None
+    twin: bool
 
 
 class MasterDoc(BaseModel):
@@ -150,7 +172,10 @@ class ScanDoc(BaseModel):
 
 
 class SettingsJobDoc(BaseModel):
-    """Work on an adapter. One of ``heard``, ``search`` and ``scan`` is given as soon as there is anything to tell."""
+    """Work on an adapter or an address.
+
+    One of ``heard``, ``search``, ``scan`` and ``identified`` is given as soon as there is anything to tell.
+    """
 
     id: str
     kind: str
@@ -161,6 +186,7 @@ class SettingsJobDoc(BaseModel):
     heard: HeardDoc | None
     search: SearchDoc | None
     scan: ScanDoc | None
+    identified: IdentifiedDoc | None
 
 
 # -- the site -------------------------------------------------------------------------
@@ -169,7 +195,8 @@ class SettingsJobDoc(BaseModel):
 class BusDoc(BaseModel):
     """A bus of a turbine; ``bitrate`` 0: the connection names it.
 
-    ``heartbeat_node``: as whom this tool beats on it while axes are moved.
+    ``heartbeat_node``: as whom this tool beats on it while axes are moved. ``connection`` ``modbus-tcp``: its devices
+    have addresses, all within ``ranges``; it has no bit rate (0) then.
     """
 
     model_config = ConfigDict(extra="forbid")
@@ -178,10 +205,15 @@ class BusDoc(BaseModel):
     connection: Short
     bitrate: Annotated[int, Field(ge=0, le=1_000_000)]
     heartbeat_node: Annotated[int, Field(ge=1, le=127)] = HEARTBEAT_NODE
+    ranges: Annotated[list[Annotated[str, Field(max_length=100)]], Field(max_length=64)] = []
 
 
 class SiteDeviceDoc(BaseModel):
-    """A device; ``slug`` is its own part of the path."""
+    """A device; ``slug`` is its own part of the path.
+
+    ``address`` (HOST[:PORT][/UNIT]) is where it listens on Modbus TCP. ``external_stop`` says what stops this axis from
+    outside where its bus cannot prove that it stops by itself; experts change it.
+    """
 
     model_config = ConfigDict(extra="forbid")
 
@@ -190,6 +222,8 @@ class SiteDeviceDoc(BaseModel):
     description_id: Short
     bus: Slug
     node: Node
+    address: Short = ""
+    external_stop: Short = ""
 
 
 class SiteStationDoc(BaseModel):
@@ -242,10 +276,11 @@ class SiteTurbineDoc(BaseModel):
 
 
 class DescriptionRef(BaseModel):
-    """A description that devices may name."""
+    """A description that devices of a bus of this kind may name."""
 
     id: str
     name: str
+    bus: Literal["canopen", "modbus-tcp"]
 
 
 class SiteDoc(BaseModel):
@@ -292,13 +327,16 @@ class PollDevice(BaseModel):
 
 
 class PollBus(BaseModel):
-    """A bus of a known turbine, and how much of its time polling takes (0..1); ``counts`` of devices by description."""
+    """A bus of a known turbine, and how much of its time polling takes (0..1); ``counts`` of devices by description.
+
+    One without a bit rate (0), as of Modbus TCP, has no such share: null.
+    """
 
     turbine: str
     bus: str
     bitrate: int
     counts: dict[str, int]
-    load: float
+    load: float | None
 
 
 class PollingDoc(BaseModel):

@@ -24,6 +24,8 @@ class WritesRequest(BaseModel):
     """``save`` names the devices whose verified values are made permanent; with "stop" nothing follows a failure.
 
     ``accepted``: rules that hold after every write elsewhere may be broken on the way where they are broken in the end.
+    ``address_confirmed``: the person knows that the device will be found at another address (``address_changes`` of the
+    plan); without it what decides the address is refused.
     """
 
     model_config = ConfigDict(extra="forbid")
@@ -32,3 +34,4 @@ class WritesRequest(BaseModel):
     save: Annotated[list[Annotated[str, Field(max_length=200)]], Field(max_length=100)]
     on_failure: Literal["stop", "go-on"] = "stop"
     accepted: bool = False
+    address_confirmed: bool = False

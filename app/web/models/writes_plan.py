@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from app.model.restore.batch import Batch
 from app.model.station import Place
+from app.service.address_change import AddressChange
 from app.web.models.rules import RuleFinding, RulePlace
 from app.web.models.writes import WritesRow
 
@@ -27,6 +28,27 @@ class WritesPlanRequest(BaseModel):
     accepted: bool = False
 
 
+class WritesAddressChange(BaseModel):
+    """A device that will be found elsewhere once it was saved and restarted; its rows need a confirmation.
+
+    ``connected``: where it is reached now. ``site_address``: what the site file must name then; null where nobody can
+    tell beforehand (DHCP, or the bus itself is switched).
+    """
+
+    device: str
+    addresses: list[str]
+    connected: str
+    site_address: str | None
+
+    @classmethod
+    def of(cls, change: AddressChange) -> WritesAddressChange:
+        """As the page gets it."""
+        addresses = [address.short for address in change.addresses]
+        return cls(
+            device=change.device, addresses=addresses, connected=change.connected, site_address=change.site_address
+        )
+
+
 class WritesPlan(BaseModel):
     """In which order a batch would be written, by what is known now.
 
@@ -38,15 +60,17 @@ class WritesPlan(BaseModel):
     unordered: list[RulePlace]
     unknown: list[RulePlace]
     broken: list[RuleFinding]
+    address_changes: list[WritesAddressChange]
 
     @classmethod
-    def of(cls, batch: Batch, unknown: Iterable[Place]) -> WritesPlan:
+    def of(cls, batch: Batch, unknown: Iterable[Place], moved: Iterable[AddressChange]) -> WritesPlan:
         """As the page gets it."""
         return cls(
             rows=_places(batch.places),
             unordered=_places(batch.unordered),
             unknown=_places(unknown),
             broken=[RuleFinding.of(one) for one in batch.broken],
+            address_changes=[WritesAddressChange.of(one) for one in moved],
         )
 
 

@@ -34,6 +34,7 @@ from app.web.routes import (
     trace,
     turbine,
     users,
+    verify,
     visits,
     writes,
 )
@@ -42,6 +43,7 @@ FEATURES = (
     session,
     turbine,
     devices,
+    verify,
     jobs,
     stop,
     motion,

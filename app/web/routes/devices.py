@@ -51,6 +51,7 @@ async def write(
     address = parse_address(request.address)
     raw = raw_from_json(target.entry(address), request.raw)
     allow = Allow.FACTORY if person.role is Role.EXPERT else Allow.NOTHING
+    allow |= Allow.ADDRESS if request.address_confirmed else Allow.NOTHING
     done = await write_raw(connection.driver(target), target, address, raw, journal, allow=allow)
     return WriteDone(
         address=address.short,

@@ -9,12 +9,13 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends
 
-from app.errors import NotConnectedError
+from app.errors import NotConnectedError, RoleError
 from app.model.roles import Role
 from app.service.motion import moves
 from app.service.motion.brake_test import try_brake
 from app.service.motion.desk import MotionDesk
 from app.service.motion.feathering import feather
+from app.service.motion.homing import search_home
 from app.service.motion.interlocks import Confirmed
 from app.service.motion.line import MotionLine, motion_line
 from app.service.motion.positions import Positions, positions
@@ -25,6 +26,7 @@ from app.web.models.motion import (
     ConfirmRequest,
     FeatheredDoc,
     FenceRequest,
+    HomedDoc,
     HomeRequest,
     InterlockDoc,
     JogRequest,
@@ -34,6 +36,7 @@ from app.web.models.motion import (
     MoveRequest,
     OrderRequest,
     PreparedDoc,
+    SearchHomeRequest,
 )
 
 router = APIRouter()
@@ -93,9 +96,12 @@ async def give_back_lease(desk: DeskOf, request: FenceRequest) -> MotionLine:
 
 
 @router.post("/live/motion/confirm", dependencies=[TECHNICIAN])
-async def confirm(desk: DeskOf, request: ConfirmRequest) -> MotionLine:
-    """What the holder has looked at: the rotor is locked, and nobody is in the hub."""
-    desk.confirm(request.fence, Confirmed(request.rotor_locked, request.people_out))
+async def confirm(desk: DeskOf, person: PersonOf, request: ConfirmRequest) -> MotionLine:
+    """What the holder has looked at. For the external stop of a drive an expert answers, nobody else."""
+    stops = frozenset(request.external_stops)
+    if stops - desk.confirmed.external_stops and not person.role.covers(Role.EXPERT):
+        raise RoleError(needs=Role.EXPERT.value, has=person.role.value)
+    desk.confirm(request.fence, Confirmed(request.rotor_locked, request.people_out, stops))
     return motion_line(desk)
 
 
@@ -113,10 +119,13 @@ async def encoder_positions(connection: ConnectionOf, target: TargetOf) -> Posit
 
 @router.post(MOTION + "/prepare", dependencies=[TECHNICIAN])
 async def prepare(desk: DeskOf, target: TargetOf, request: OrderRequest) -> PreparedDoc:
-    """Have the drive watch our heartbeat and prove that it stops without it. Held; its fault may feather the blades."""
+    """Have the drive watch our heartbeat and prove that it stops without it. Held; its fault may feather the blades.
+
+    One whose bus has no heartbeat is only taken, where ``self_stop`` of its interlocks lets it.
+    """
     desk.admit(request.fence, request.order)
     axis = await desk.prepare(target.slug, request.fence)
-    return PreparedDoc(proof_ms=round(1000 * (axis.proof_s or 0.0)))
+    return PreparedDoc(proof_ms=axis.proof_ms)
 
 
 @router.post(MOTION + "/put-back", dependencies=[TECHNICIAN])
@@ -129,26 +138,34 @@ async def put_back(desk: DeskOf, target: TargetOf, request: OrderRequest) -> Mot
 
 @router.post(MOTION + "/jog", dependencies=[TECHNICIAN])
 async def jog(desk: DeskOf, target: TargetOf, journal: JournalOf, request: JogRequest) -> MovedDoc:
-    """Turn the blade as long as it is held."""
+    """Turn the axis as long as it is held."""
     desk.admit(request.fence, request.order)
-    await moves.jog(desk, target.slug, request.fence, request.speed_dps, journal)
+    await moves.jog(desk, target.slug, request.fence, request.speed, journal)
     return _moved(desk)
 
 
 @router.post(MOTION + "/move", dependencies=[TECHNICIAN])
 async def move(desk: DeskOf, target: TargetOf, journal: JournalOf, request: MoveRequest) -> MovedDoc:
-    """Move the blade to an angle as long as it is held."""
+    """Move the axis to a position as long as it is held."""
     desk.admit(request.fence, request.order)
-    await moves.move_to(desk, target.slug, request.fence, request.angle_deg, request.speed_dps, journal)
+    await moves.move_to(desk, target.slug, request.fence, request.position, request.speed, journal)
     return _moved(desk)
 
 
 @router.post(MOTION + "/home", dependencies=[TECHNICIAN])
 async def home(desk: DeskOf, target: TargetOf, journal: JournalOf, request: HomeRequest) -> MovedDoc:
-    """Take the present position of an axis without power for an angle (homing method 35)."""
+    """Take the present position of an axis without power for another one (homing method 35)."""
     desk.admit(request.fence, request.order)
-    await moves.home(desk, target.slug, request.fence, request.angle_deg, journal)
+    await moves.home(desk, target.slug, request.fence, request.position, journal)
     return _moved(desk)
+
+
+@router.post(MOTION + "/search-home", dependencies=[TECHNICIAN])
+async def find_home(desk: DeskOf, target: TargetOf, journal: JournalOf, request: SearchHomeRequest) -> HomedDoc:
+    """Home a drive that has methods to look for its home, as long as it is held."""
+    desk.admit(request.fence, request.order)
+    position = await search_home(desk, target.slug, request.fence, request.method, journal)
+    return HomedDoc(why=_moved(desk).why, position=position)
 
 
 @router.post(MOTION + "/reset", dependencies=[TECHNICIAN])

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import asyncio
 from collections import Counter
+from typing import Literal
 
 from fastapi import APIRouter
 
 from app.drivers.adapters import Place
 from app.drivers.can_config import BITRATES_OF
-from app.errors import HubsideError, RestoreOpenError, SiteError
+from app.errors import HubsideError, RestoreOpenError, SiteError, UsageError
 from app.model.address import Address, parse_address
 from app.model.description import Bus, Description
 from app.model.description_file import BUILTIN, load_builtin
-from app.model.roles import Role
-from app.model.site import BusConfig, Device, Turbine
+from app.model.roles import Role, SignedIn
+from app.model.servers import Server, parse_server
+from app.model.site import MAX_NODE, BusConfig, Device, Turbine
 from app.service import about as about_program
 from app.service.adapters import (
     Heard,
@@ -29,10 +31,12 @@ from app.service.adapters import (
     scan_adapter,
 )
 from app.service.bench import Bench
+from app.service.identify import Asked, ask_address
 from app.service.jobs import Job
 from app.service.polling import PollPlan, Rate, read_bits, usual_list
+from app.service.site_check import changes_a_stop
 from app.service.site_edit import propose, turbine_of
-from app.web.deps import BenchOf, JobsOf, JournalOf, needs
+from app.web.deps import BenchOf, JobsOf, JournalOf, Needs, PersonOf, needs
 from app.web.models.settings import (
     AboutDoc,
     AdapterDoc,
@@ -41,6 +45,8 @@ from app.web.models.settings import (
     DescriptionRef,
     FoundDoc,
     HeardDoc,
+    IdentifiedDoc,
+    IdentifyRequest,
     LibraryDoc,
     MasterDoc,
     PlaceDoc,
@@ -67,7 +73,7 @@ from app.web.problem import NotFoundError
 from app.web.routes.jobs import failure
 
 router = APIRouter(prefix="/settings")
-KINDS = ("adapter_test", "bitrate_search", "adapter_scan")
+KINDS = ("adapter_test", "bitrate_search", "adapter_scan", "address_identify")
 
 
 # -- adapters -------------------------------------------------------------------------
@@ -128,6 +134,19 @@ async def start_scan(bench: BenchOf, jobs: JobsOf, request: ScanRequest) -> Sett
     return _job_doc(jobs.start(KINDS[2], "", lambda job: scan_adapter(job, config, can, request.consent, link)))
 
 
+@router.post("/identify", dependencies=[needs(Role.TECHNICIAN)])
+async def start_identify(bench: BenchOf, jobs: JobsOf, request: IdentifyRequest) -> SettingsJobDoc:
+    """Ask exactly this address of Modbus TCP who is there; a bus of the site must allow it."""
+    try:
+        server = parse_server(request.address)
+    except ValueError as error:
+        raise UsageError(reason=str(error)) from error
+    turbines = tuple(bench.sites.turbines.values())
+    known = [one for one in _known(bench).values() if one.bus is Bus.MODBUS_TCP]
+    connection = bench.connection
+    return _job_doc(jobs.start(KINDS[3], "", lambda job: ask_address(job, server, turbines, known, connection)))
+
+
 @router.get("/jobs/{job_id}")
 async def settings_job(jobs: JobsOf, job_id: str) -> SettingsJobDoc:
     """How the work on an adapter stands, with what it has found so far."""
@@ -149,6 +168,23 @@ def _job_doc(job: Job) -> SettingsJobDoc:
         heard=_heard_doc(result) if isinstance(result, Heard) else None,
         search=_search_doc(result) if isinstance(result, SearchResult) else None,
         scan=_scan_doc(result) if isinstance(result, ScanResult) else None,
+        identified=_identified_doc(result) if isinstance(result, Asked) else None,
+    )
+
+
+def _identified_doc(asked: Asked) -> IdentifiedDoc | None:
+    found = asked.found
+    if found is None:
+        return None
+    return IdentifiedDoc(
+        address=str(Server(*asked.peer[1:])),
+        description_id=found.description_id,
+        variant=asked.variant,
+        device_name=found.device_name or None,
+        hardware=found.hardware or None,
+        software=found.software or None,
+        serial=asked.serial,
+        twin=found.is_twin,
     )
 
 
@@ -213,17 +249,30 @@ async def site(bench: BenchOf) -> SiteDoc:
 
 
 @router.post("/site/turbines", dependencies=[needs(Role.TECHNICIAN)])
-async def add_turbine(bench: BenchOf, journal: JournalOf, request: TurbineChange) -> SiteDoc:
-    """Add a turbine to the site file."""
-    await bench.site_editor.add(_turbine(request.turbine), request.revision, journal)
+async def add_turbine(bench: BenchOf, person: PersonOf, journal: JournalOf, request: TurbineChange) -> SiteDoc:
+    """Add a turbine to the site file; one that says what stops an axis from outside is an expert's."""
+    turbine = _turbine(request.turbine)
+    _require_stops(bench, person, turbine)
+    await bench.site_editor.add(turbine, request.revision, journal)
     return _site_doc(bench)
 
 
 @router.put("/site/turbines/{slug}", dependencies=[needs(Role.TECHNICIAN)])
-async def change_turbine(bench: BenchOf, journal: JournalOf, slug: str, request: TurbineChange) -> SiteDoc:
-    """Change a turbine of the site file; slugs are permanent."""
-    await bench.site_editor.change(slug, _turbine(request.turbine), request.revision, journal)
+async def change_turbine(
+    bench: BenchOf, person: PersonOf, journal: JournalOf, slug: str, request: TurbineChange
+) -> SiteDoc:
+    """Change a turbine of the site file; slugs are permanent. What stops an axis from outside is changed by experts."""
+    turbine = _turbine(request.turbine)
+    _require_stops(bench, person, turbine)
+    await bench.site_editor.change(slug, turbine, request.revision, journal)
     return _site_doc(bench)
+
+
+def _require_stops(bench: Bench, person: SignedIn, after: Turbine) -> None:
+    """Raises RoleError. A revision that is another one by then is refused by the editor."""
+    before = next((one for one in bench.site_editor.state().turbines if one.slug == after.slug), None)
+    if changes_a_stop(before, after):
+        Needs(Role.EXPERT)(person)
 
 
 @router.delete("/site/turbines/{slug}", dependencies=[needs(Role.TECHNICIAN)])
@@ -247,8 +296,13 @@ def _site_doc(bench: Bench) -> SiteDoc:
         revision=state.revision,
         connected=None if bench.connection is None else bench.connection.turbine.slug,
         turbines=[_turbine_doc(one) for one in state.turbines],
-        descriptions=[DescriptionRef(id=key, name=one.name) for key, one in known.items() if one.bus is Bus.CANOPEN],
+        descriptions=[_ref(key, one) for key, one in known.items() if one.bus in MAX_NODE],
     )
+
+
+def _ref(key: str, description: Description) -> DescriptionRef:
+    kind: Literal["canopen", "modbus-tcp"] = "modbus-tcp" if description.bus is Bus.MODBUS_TCP else "canopen"
+    return DescriptionRef(id=key, name=description.name, bus=kind)
 
 
 def _turbine_doc(turbine: Turbine) -> SiteTurbineDoc:
@@ -258,7 +312,11 @@ def _turbine_doc(turbine: Turbine) -> SiteTurbineDoc:
         name=turbine.name,
         buses=[
             BusDoc.model_construct(
-                name=bus.name, connection=bus.connection, bitrate=bus.bitrate, heartbeat_node=bus.heartbeat_node
+                name=bus.name,
+                connection=bus.connection,
+                bitrate=bus.bitrate,
+                heartbeat_node=bus.heartbeat_node,
+                ranges=list(bus.ranges),
             )
             for bus in turbine.buses
         ],
@@ -274,6 +332,8 @@ def _turbine_doc(turbine: Turbine) -> SiteTurbineDoc:
                         description_id=device.description_id,
                         bus=device.bus,
                         node=device.node,
+                        address=device.address,
+                        external_stop=device.external_stop,
                     )
                     for device in station.devices
                 ],
@@ -288,17 +348,24 @@ def _turbine(doc: SiteTurbineDoc) -> Turbine:
     _once("station", [station.slug for station in doc.stations])
     for station in doc.stations:
         _once(f"station.{station.slug}.device", [device.slug for device in station.devices])
-    buses = [BusConfig(bus.name, bus.connection, bus.bitrate, bus.heartbeat_node) for bus in doc.buses]
+    buses = [
+        BusConfig(bus.name, bus.connection, bus.bitrate, bus.heartbeat_node, tuple(bus.ranges)) for bus in doc.buses
+    ]
     stations = [
         (
             station.slug,
             station.name,
             station.blade,
-            [Device(one.slug, one.name, one.description_id, one.bus, one.node) for one in station.devices],
+            [_device(one) for one in station.devices],
         )
         for station in doc.stations
     ]
     return turbine_of(doc.slug, doc.name, buses, stations)
+
+
+def _device(doc: SiteDeviceDoc) -> Device:
+    stop = doc.external_stop.strip()
+    return Device(doc.slug, doc.name, doc.description_id, doc.bus, doc.node, doc.address.strip(), stop)
 
 
 def _once(key: str, slugs: list[str]) -> None:
@@ -357,14 +424,15 @@ def _polling_doc(bench: Bench, plan: PollPlan) -> PollingDoc:
     known = _known(bench)
     counts = {
         (turbine.slug, bus.name): (
-            bus.bitrate or 500_000,
+            _bitrate(bus),
             Counter(device.description_id for device in turbine.devices if device.bus == bus.name),
         )
         for turbine in bench.sites.turbines.values()
         for bus in turbine.buses
     }
     used = {name for _rate, here in counts.values() for name in here}
-    shown = {name: one for name, one in known.items() if one.bus is Bus.CANOPEN and (name in used or plan.of(one))}
+    used |= plan.lists.keys()
+    shown = {name: one for name, one in known.items() if name in used or (one.bus is Bus.CANOPEN and plan.of(one))}
     return PollingDoc(
         period_s=plan.period_s,
         slow_every=plan.slow_every,
@@ -377,11 +445,18 @@ def _polling_doc(bench: Bench, plan: PollPlan) -> PollingDoc:
                 bus=bus,
                 bitrate=bitrate,
                 counts=dict(here),
-                load=plan.load([known[name] for name in here.elements() if name in known], bitrate),
+                load=plan.load([known[name] for name in here.elements() if name in known], bitrate)
+                if bitrate
+                else None,
             )
             for (turbine, bus), (bitrate, here) in counts.items()
         ],
     )
+
+
+def _bitrate(bus: BusConfig) -> int:
+    """In bit/s; 0 for a bus that has none."""
+    return bus.bitrate or (500_000 if bus.kind is Bus.CANOPEN else 0)
 
 
 def _poll_device(description: Description, plan: PollPlan) -> PollDevice:

@@ -7,6 +7,7 @@ from fastapi import APIRouter
 from app.model.address import parse_address
 from app.model.checks import Allow
 from app.model.roles import Role, SignedIn
+from app.service.address_change import address_changes
 from app.service.connection import Connection
 from app.service.jobs import Job
 from app.service.views import raw_from_json
@@ -33,7 +34,7 @@ async def writes(
         changes,
         frozenset(request.save),
         OnFailure(request.on_failure),
-        _allowed(person),
+        _allowed(person) | (Allow.ADDRESS if request.address_confirmed else Allow.NOTHING),
         beside,
         request.accepted,
     )
@@ -47,9 +48,11 @@ async def writes(
 @router.post("/live/writes/plan")
 async def plan_writes(connection: ConnectionOf, person: PersonOf, request: WritesPlanRequest) -> WritesPlan:
     """In which order a batch would be written, so that after every write all rules hold that must. Sends nothing."""
-    wanted = {change.place: change.raw for change in (_change(connection, row) for row in request.rows)}
+    changes = [_change(connection, row) for row in request.rows]
+    wanted = {change.place: change.raw for change in changes}
     known = KnownDevices(connection.targets, _allowed(person), request.accepted)
-    return WritesPlan.of(known.order(wanted), known.unknown(wanted))
+    moved = address_changes((change.target, change.address, change.raw) for change in changes)
+    return WritesPlan.of(known.order(wanted), known.unknown(wanted), moved)
 
 
 def _allowed(person: SignedIn) -> Allow:

@@ -20,6 +20,10 @@ MIN_LENGTH: Final = 2
 MAX_LENGTH: Final = 1 + 3 + MAX_FRAME_BYTES
 """Unit, head and frames of FC 101; standard Modbus ends at 254."""
 MAX_ADU: Final = HEADER_SIZE - 1 + MAX_LENGTH
+ETHERNET_BPS: Final = 100_000_000
+"""What the load of a Modbus TCP bus is a share of: the port of the drives (fast Ethernet)."""
+_TCP_OCTETS: Final = 14 + 20 + 20 + 24
+"""What carries an ADU: Ethernet, IP and TCP headers, check, preamble and gap."""
 _HEADER: Final = struct.Struct(">HHHB")
 _LENGTH_AT: Final = 4
 
@@ -41,6 +45,11 @@ class Message(NamedTuple):
         length = checked(1 + len(self.pdu), MIN_LENGTH, MAX_LENGTH, "length")
         transaction = checked(self.transaction, 0, MAX_WORD, "transaction")
         return _HEADER.pack(transaction, 0, length, checked(self.unit, 0, 0xFF, "unit")) + self.pdu
+
+
+def wire_bits(size: int) -> int:
+    """Bits that an ADU of ``size`` bytes takes on the Ethernet, in a packet of its own."""
+    return 8 * (size + _TCP_OCTETS)
 
 
 def decode_adu(data: bytes) -> Message:

@@ -72,8 +72,12 @@ class ModbusDecoder:
 
     def node_of(self, frame: Frame) -> int:
         """The device that sent or gets an ADU; 0 where none that is known does."""
-        path = self._path(frame.payload.link, frame.direction) if isinstance(frame.payload, Adu) else None
+        path = self.path(frame)
         return 0 if path is None else path.node
+
+    def path(self, frame: Frame) -> Path | None:
+        """Whose ADU it is and which way it goes; None where no device that is known takes part."""
+        return self._path(frame.payload.link, frame.direction) if isinstance(frame.payload, Adu) else None
 
     def image(self, node: int, sent_by_device: bool) -> ProcessImage | None:
         """The process image of ``node`` as it was seen to be, None where it was not."""

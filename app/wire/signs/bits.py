@@ -37,17 +37,18 @@ def _any_low(*bits: int) -> Callable[[int], bool]:
 
 _ERROR, _WARNING, _INFO = Severity.ERROR, Severity.WARNING, Severity.INFO
 
+_CIA402: Final = (
+    Test(SignKind.AXIS_FAULT, _ERROR, lambda raw: raw & 0x4F in (0x08, 0x0F)),
+    Test(SignKind.QUICK_STOP, _WARNING, lambda raw: raw & 0x6F == 0x07),
+    Test(SignKind.AXIS_ENABLED, _INFO, lambda raw: raw & 0x6F == 0x27),
+    Test(SignKind.AXIS_WARNING, _WARNING, _high(7)),
+    Test(SignKind.REMOTE_LOST, _WARNING, _low(9)),
+    Test(SignKind.INTERNAL_LIMIT, _INFO, _high(11)),
+)
 TABLES: Final[dict[str, tuple[Test, ...]]] = {
     # Statusword, masks of CiA 402 (manual, table 49)
-    "statusword": (
-        Test(SignKind.AXIS_FAULT, _ERROR, lambda raw: raw & 0x4F in (0x08, 0x0F)),
-        Test(SignKind.QUICK_STOP, _WARNING, lambda raw: raw & 0x6F == 0x07),
-        Test(SignKind.AXIS_ENABLED, _INFO, lambda raw: raw & 0x6F == 0x27),
-        Test(SignKind.AXIS_WARNING, _WARNING, _high(7)),
-        Test(SignKind.REMOTE_LOST, _WARNING, _low(9)),
-        Test(SignKind.INTERNAL_LIMIT, _INFO, _high(11)),
-        Test(SignKind.FOLLOWING_ERROR, _WARNING, _high(13)),
-    ),
+    "statusword": (*_CIA402, Test(SignKind.FOLLOWING_ERROR, _WARNING, _high(13))),
+    "pd4e_statusword": _CIA402,  # bit 13 is a following error in some modes only, and no other bit tells which
     "controlword": (Test(SignKind.EFC_COMMAND, _WARNING, _high(11)),),
     # Inputs of the axis; those of safety are at 24 V when all is well (manual, tables 71 and 72)
     "pmc_digital_inputs": (

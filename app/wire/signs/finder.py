@@ -18,6 +18,7 @@ from app.wire.records import (
     NmtCommandSeen,
     Outcome,
     Record,
+    RestartSeen,
     SdoAccess,
     SdoSeen,
     Source,
@@ -55,6 +56,7 @@ class SignFinder:
             StateSeen: self._on_state,
             EmcySeen: self._on_emcy,
             BootUpSeen: self._on_boot_up,
+            RestartSeen: self._on_boot_up,
             NmtCommandSeen: self._on_nmt,
             GapSeen: self._on_gap,
         }
@@ -215,7 +217,7 @@ class SignFinder:
         node.told_codes.add(seen.code)
         return (self._sign(seen.t_ns, node, SignKind.EMCY, severity, details),)
 
-    def _on_boot_up(self, seen: BootUpSeen) -> Sequence[Sign]:
+    def _on_boot_up(self, seen: BootUpSeen | RestartSeen) -> Sequence[Sign]:
         node = self._node(seen.bus, seen.node)
         before_ns, node.heard_ns = node.heard_ns, seen.t_ns
         node.back(before_ns, seen.t_ns)

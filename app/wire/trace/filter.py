@@ -21,7 +21,7 @@ MeansText = Callable[[TraceRow], bool]
 
 @dataclass(frozen=True)
 class TraceFilter:
-    """Empty choices let everything pass. ``ids`` are ranges of identifiers, ends included; times in ns, ends included.
+    """Empty choices let everything pass. ``ids`` are ranges of CAN identifiers, times are in ns; ends are included.
 
     ``data`` is a pattern over the data bytes in hexadecimal digits. ``means`` decides by what a row says.
     """
@@ -58,13 +58,10 @@ class TraceFilter:
             return False
         if self.direction is not None and direction_of(item) is not self.direction:
             return False
-        can = item.payload
-        return isinstance(can, Can) and self._passes_can(can)
-
-    def _passes_can(self, can: Can) -> bool:
-        if self.ids and not any(low <= can.can_id <= high for low, high in self.ids):
+        payload = item.payload
+        if self.ids and not (isinstance(payload, Can) and any(low <= payload.can_id <= high for low, high in self.ids)):
             return False
-        return self.data is None or self.data.match(can.data.hex()) is not None
+        return self.data is None or self.data.match(payload.data.hex()) is not None
 
     def passes_row(self, row: TraceRow) -> bool:
         """What only the meaning tells; to be asked after ``passes_item``."""

@@ -1,7 +1,7 @@
 """The last frames of a bus, kept so that any part of them can be decoded again with its context.
 
-Frames lie in chunks, each with the decoder's state before its first one. A full chunk is packed: 30 bytes a frame, and
-nothing that the garbage collector must look at, where the frame itself takes some 300. Who looks back unpacks and
+Frames lie in chunks, each with the decoder's state before its first one. A full chunk is packed: 30 bytes a CAN frame,
+and nothing that the garbage collector must look at, where the frame itself takes some 300. Who looks back unpacks and
 decodes what is looked at; while nobody looks, keeping a frame costs next to nothing.
 
 The receive thread writes under its lock; readers take ``chunks()`` under the same lock and read them without.
@@ -12,19 +12,17 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import islice
-from struct import Struct
 from typing import Any, Final
 
-from app.wire.frame import Can, Direction, Frame
+from app.wire.frame import Adu
+from app.wire.trace import adu_packing, can_packing
+from app.wire.trace.packing import Packing
 from app.wire.trace.tracer import Gap, Item
 
 LIMIT: Final = 200_000
-"""Items kept of a bus: 6 MB; 25 s of a full bus of 1 Mbit/s, some minutes of a usual one."""
+"""Items kept of a bus: 6 MB; 25 s of a full bus of 1 Mbit/s, some minutes of a usual one. ADUs are longer: 50 MB of a
+dictionary that is read again and again, 10 MB of what else is asked."""
 CHUNK: Final = 1000
-_PACKED: Final = Struct("<QqIBb8s")
-_NO_TIME: Final = -1
-_LENGTH: Final = 0x0F
-_TX, _EXTENDED, _REMOTE, _ERROR = 0x10, 0x20, 0x40, 0x80
 
 Snapshot = Mapping[str, Any]
 
@@ -32,12 +30,13 @@ Snapshot = Mapping[str, Any]
 class Chunk:
     """Items from number ``first`` on, and the state of the decoder before them."""
 
-    __slots__ = ("_bus", "_gaps", "_items", "_packed", "count", "end_ns", "first", "snapshot", "start_ns")
+    __slots__ = ("_bus", "_gaps", "_items", "_packed", "_packing", "count", "end_ns", "first", "snapshot", "start_ns")
 
     def __init__(self, bus: str, first: int, snapshot: Snapshot, items: Sequence[Item] = ()) -> None:
         self._bus = bus
         self._items: list[Item] | None = list(items)
         self._packed = b""
+        self._packing: Packing = can_packing
         self._gaps: dict[int, Gap] = {}
         self.first = first
         self.snapshot = snapshot
@@ -59,7 +58,9 @@ class Chunk:
         """Keep as bytes from now on; gives the items as they were."""
         items = self._items or []
         self._gaps = {at: item for at, item in enumerate(items) if isinstance(item, Gap)}
-        self._packed = b"".join(_pack(item) for item in items)
+        frames = [item for item in items if not isinstance(item, Gap)]
+        self._packing = adu_packing if frames and isinstance(frames[0].payload, Adu) else can_packing
+        self._packed = self._packing.pack(frames)
         self._items = None
         return items
 
@@ -74,31 +75,9 @@ class Chunk:
         return self._unpacked()
 
     def _unpacked(self) -> Iterator[Item]:
-        bus, gaps, rx, tx = self._bus, self._gaps, Direction.RX, Direction.TX
-        for at, (t_ns, adapter_ns, can_id, flags, dlc, data) in enumerate(_PACKED.iter_unpack(self._packed)):
-            if at in gaps:
-                yield gaps[at]
-                continue
-            can = Can(
-                can_id,
-                data[: flags & _LENGTH],
-                bool(flags & _EXTENDED),
-                bool(flags & _REMOTE),
-                bool(flags & _ERROR),
-                dlc,
-            )
-            yield Frame(t_ns, bus, tx if flags & _TX else rx, can, None if adapter_ns == _NO_TIME else adapter_ns)
-
-
-def _pack(item: Item) -> bytes:
-    if isinstance(item, Gap):
-        return _PACKED.pack(item.t_ns, 0, 0, 0, 0, b"")
-    t_ns, _, direction, can, adapter_ns = item
-    if not isinstance(can, Can):
-        raise TypeError("the ring holds frames of a CAN bus")
-    flags = len(can.data) | (_TX if direction is Direction.TX else 0) | (_EXTENDED if can.extended else 0)
-    flags |= (_REMOTE if can.remote else 0) | (_ERROR if can.error else 0)
-    return _PACKED.pack(t_ns, _NO_TIME if adapter_ns is None else adapter_ns, can.can_id, flags, can.dlc, can.data)
+        frames = self._packing.unpack(self._packed, self._bus)
+        for at in range(self.count):
+            yield self._gaps[at] if at in self._gaps else next(frames)
 
 
 class FrameRing:

@@ -1,4 +1,4 @@
-"""Which service a CAN identifier belongs to and whose it is: what a person reads first of a frame.
+"""Which service a frame belongs to and whose it is: what a person reads first of it.
 
 The identifiers are those of the predefined connection set (CiA 301, 7.3.5); a decoder knows which were moved.
 """
@@ -32,6 +32,8 @@ class Service(Enum):
     SDO_RESPONSE = "sdo-response"
     HEARTBEAT = "heartbeat"
     LSS = "lss"
+    MODBUS_REQUEST = "modbus-request"
+    MODBUS_RESPONSE = "modbus-response"
     ERROR = "error"
     TWIN = "twin"
     """Rotor and wind, as a twin tells them (``app.wire.twin_environment``)."""
@@ -43,7 +45,10 @@ class Service(Enum):
 
 
 class Speaker(NamedTuple):
-    """The service of an identifier and the node that it belongs to (0: all, or none); ``number`` counts PDOs from 1."""
+    """The service of a frame and the node that it belongs to (0: all, or none).
+
+    ``number`` counts PDOs from 1; of Modbus it is the function code.
+    """
 
     service: Service
     node: int = 0

@@ -6,6 +6,7 @@ traffic: then it knows which transfers are open and which mappings are in force.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping
 from enum import Enum
 from typing import Any, Final, NamedTuple
@@ -14,16 +15,19 @@ from app.model.address import Address
 from app.model.description import Description
 from app.wire import sdo
 from app.wire.decoder import CanOpenDecoder
+from app.wire.decoders import BusDecoder
 from app.wire.emcy import NO_ERROR
 from app.wire.frame import Can, Direction, Frame
 from app.wire.records import (
     EmcySeen,
     GapSeen,
+    MalformedAduSeen,
     MalformedSeen,
     OrphanSeen,
     Outcome,
     Record,
     SdoSeen,
+    TransactionSeen,
 )
 from app.wire.trace.service import Service, Speaker
 
@@ -45,7 +49,7 @@ Item = Frame | Gap
 
 
 class Step(Enum):
-    """Protocol step of an SDO frame (CiA 301, 7.2.4.3)."""
+    """Protocol step of an SDO frame (CiA 301, 7.2.4.3), or what a Modbus message asks for or answers."""
 
     READ = "read"
     READ_ANSWER = "read-answer"
@@ -63,6 +67,13 @@ class Step(Enum):
     BLOCK_TAKEN = "block-taken"
     BLOCK_END = "block-end"
     BLOCK_END_TAKEN = "block-end-taken"
+    REGISTERS_READ = "registers-read"
+    REGISTERS_WRITE = "registers-write"
+    REGISTERS_BOTH = "registers-both"
+    DICTIONARY = "dictionary"
+    ARRAY_READ = "array-read"
+    ARRAY_WRITE = "array-write"
+    EXCEPTION = "exception"
     ABORT = "abort"
     UNKNOWN = "unknown"
 
@@ -130,9 +141,10 @@ class Tone(Enum):
 class TraceRow(NamedTuple):
     """One frame and what it means.
 
-    ``step``, ``address``, ``value`` and ``abort_code`` are of SDO frames, None where there is none. ``value`` is what
-    an expedited write asks for, or what a transfer brought that this very frame completed. ``records`` are those that
-    this frame made known.
+    ``step``, ``address``, ``value`` and ``abort_code`` are of SDO frames and of Modbus, None where there is none.
+    ``value`` is what an expedited write asks for, or what a transfer brought that this very frame completed.
+    ``records`` are those that this frame made known. ``read`` and ``written`` are the first register and how many of a
+    Modbus request, ``exception`` is the code of a refusal.
     """
 
     item: Item
@@ -142,6 +154,9 @@ class TraceRow(NamedTuple):
     value: bytes | None
     abort_code: int | None
     records: tuple[Record, ...]
+    read: tuple[int, int] | None = None
+    written: tuple[int, int] | None = None
+    exception: int | None = None
 
     @property
     def t_ns(self) -> int:
@@ -151,10 +166,18 @@ class TraceRow(NamedTuple):
     @property
     def tone(self) -> Tone:
         """Red what failed, amber what nobody ended or asked for."""
-        if self.step is Step.ABORT or self.speaker.service in (Service.ERROR, Service.GAP):
+        if self.step in (Step.ABORT, Step.EXCEPTION) or self.speaker.service in (Service.ERROR, Service.GAP):
             return Tone.ERROR
         tones = {_tone(record) for record in self.records}
         return next((tone for tone in (Tone.ERROR, Tone.WARNING) if tone in tones), Tone.PLAIN)
+
+    @property
+    def took_ns(self) -> int | None:
+        """Since the first request of the transfer, or transaction, that ended here."""
+        for record in self.records:
+            if isinstance(record, SdoSeen | TransactionSeen) and record.outcome is not Outcome.LOST:
+                return record.dt_ns
+        return None
 
     @property
     def done(self) -> SdoSeen | None:
@@ -166,42 +189,66 @@ class TraceRow(NamedTuple):
 
 
 def _tone(record: Record) -> Tone:
-    if isinstance(record, SdoSeen):
+    if isinstance(record, SdoSeen | TransactionSeen):
+        if isinstance(record, TransactionSeen) and record.abort_code == sdo.Abort.NO_DATA:
+            return Tone.PLAIN  # the end of a list
         if record.outcome is Outcome.DONE:
             return Tone.PLAIN
         return Tone.WARNING if record.outcome is Outcome.LOST else Tone.ERROR
     if isinstance(record, EmcySeen):
         return Tone.PLAIN if record.code == NO_ERROR else Tone.ERROR
-    if isinstance(record, MalformedSeen | GapSeen):
+    if isinstance(record, MalformedSeen | MalformedAduSeen | GapSeen):
         return Tone.ERROR
     return Tone.WARNING if isinstance(record, OrphanSeen) else Tone.PLAIN
 
 
-class Tracer:
-    """Makes rows of the frames of one bus. ``snapshot``: state of the decoder before the first of them."""
+class Tracing(ABC):
+    """Makes rows of the frames of one bus, which ``decoder`` follows. ``snapshot``: its state before the first."""
 
-    def __init__(
-        self, bus: str, descriptions: Mapping[int, Description], snapshot: Mapping[str, Any] | None = None
-    ) -> None:
-        self._decoder = CanOpenDecoder(bus, descriptions)
+    def __init__(self, decoder: BusDecoder, snapshot: Mapping[str, Any] | None = None) -> None:
+        self._follower = decoder
         if snapshot is not None:
-            self._decoder.restore(snapshot)
+            decoder.restore(snapshot)
 
     def restart(self, snapshot: Mapping[str, Any]) -> None:
         """Go on from another place in the traffic."""
-        self._decoder.restore(snapshot)
+        self._follower.restore(snapshot)
 
     def skip(self, items: Iterable[Item]) -> None:
         """Take items of which no rows are wanted."""
         for item in items:
             if isinstance(item, Gap):
-                self._decoder.gap(item.t_ns, item.reason)
+                self._follower.gap(item.t_ns, item.reason)
             else:
-                self._decoder.feed(item)
+                self._follower.feed(item)
 
     def rows(self, items: Iterable[Item]) -> Iterator[TraceRow]:
         """A row for each item."""
         return map(self.take, items)
+
+    def take(self, item: Item) -> TraceRow:
+        """The row of one item."""
+        if isinstance(item, Gap):
+            records = tuple(self._follower.gap(item.t_ns, item.reason))
+            return TraceRow(item, GAP_SPEAKER, None, None, None, None, records)
+        return self._taken(item)
+
+    @abstractmethod
+    def speaker(self, item: Item) -> Speaker:
+        """Whose item it is, by what is known before it is taken."""
+
+    @abstractmethod
+    def _taken(self, frame: Frame) -> TraceRow: ...
+
+
+class Tracer(Tracing):
+    """Of a CAN bus."""
+
+    def __init__(
+        self, bus: str, descriptions: Mapping[int, Description], snapshot: Mapping[str, Any] | None = None
+    ) -> None:
+        self._decoder = CanOpenDecoder(bus, descriptions)
+        super().__init__(self._decoder, snapshot)
 
     def speaker(self, item: Item) -> Speaker:
         """Whose item it is, by what is known before it is taken."""
@@ -212,11 +259,8 @@ class Tracer:
             return Speaker(Service.UNKNOWN)
         return _ERROR_SPEAKER if can.error else self._decoder.speaker(can.can_id, can.extended)
 
-    def take(self, item: Item) -> TraceRow:
-        """The row of one item."""
+    def _taken(self, item: Frame) -> TraceRow:
         speaker = self.speaker(item)
-        if isinstance(item, Gap):
-            return TraceRow(item, speaker, None, None, None, None, tuple(self._decoder.gap(item.t_ns, item.reason)))
         can = item.payload
         if speaker.service in _SDO and isinstance(can, Can) and len(can.data) == 8 and not can.remote:
             return self._sdo(item, can.data, speaker)

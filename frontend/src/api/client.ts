@@ -3,6 +3,7 @@ import type {
   ProblemDoc,
   Raw,
   RestartResult,
+  VerifyResult,
   SaveResult,
   StopResult,
   WriteResult,
@@ -127,6 +128,7 @@ export const commands = {
   save: (slug: string, category: string | null = null) =>
     post<SaveResult>(`${device(slug)}/save`, { category }),
   restart: (slug: string) => post<RestartResult>(`${device(slug)}/restart`, {}),
+  verify: (slug: string) => post<VerifyResult>(`${device(slug)}/verify`, {}),
   consent: () => post<object>("/api/live/consent", {}),
   stop: () => post<StopResult>("/api/live/stop", {}),
   feather: () => post<StopResult>("/api/live/feather", {}),

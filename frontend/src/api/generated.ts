@@ -985,7 +985,7 @@ export interface paths {
         put?: never;
         /**
          * Home
-         * @description Take the present position of an axis without power for an angle (homing method 35).
+         * @description Take the present position of an axis without power for another one (homing method 35).
          */
         post: operations["home"];
         delete?: never;
@@ -1025,7 +1025,7 @@ export interface paths {
         put?: never;
         /**
          * Jog
-         * @description Turn the blade as long as it is held.
+         * @description Turn the axis as long as it is held.
          */
         post: operations["jog"];
         delete?: never;
@@ -1045,7 +1045,7 @@ export interface paths {
         put?: never;
         /**
          * Move
-         * @description Move the blade to an angle as long as it is held.
+         * @description Move the axis to a position as long as it is held.
          */
         post: operations["move"];
         delete?: never;
@@ -1086,6 +1086,8 @@ export interface paths {
         /**
          * Prepare
          * @description Have the drive watch our heartbeat and prove that it stops without it. Held; its fault may feather the blades.
+         *
+         *     One whose bus has no heartbeat is only taken, where ``self_stop`` of its interlocks lets it.
          */
         post: operations["prepare"];
         delete?: never;
@@ -1168,6 +1170,26 @@ export interface paths {
          * @description Reset the fault of the axis; nothing moves by it.
          */
         post: operations["reset"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/live/devices/{turbine}/{station}/{device}/motion/search-home": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Find Home
+         * @description Home a drive that has methods to look for its home, as long as it is held.
+         */
+        post: operations["find_home"];
         delete?: never;
         options?: never;
         head?: never;
@@ -1394,6 +1416,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/live/devices/{turbine}/{station}/{device}/verify": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Verify Device
+         * @description Read the whole dictionary of the device and hold its description against it. Writes nothing.
+         */
+        post: operations["verify_device"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/live/devices/{turbine}/{station}/{device}/write": {
         parameters: {
             query?: never;
@@ -1529,7 +1571,7 @@ export interface paths {
         put?: never;
         /**
          * Confirm
-         * @description What the holder has looked at: the rotor is locked, and nobody is in the hub.
+         * @description What the holder has looked at. For the external stop of a drive an expert answers, nobody else.
          */
         post: operations["confirm"];
         delete?: never;
@@ -3504,6 +3546,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/settings/identify": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Start Identify
+         * @description Ask exactly this address of Modbus TCP who is there; a bus of the site must allow it.
+         */
+        post: operations["start_identify"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/settings/jobs/{job_id}": {
         parameters: {
             query?: never;
@@ -3619,7 +3681,7 @@ export interface paths {
         put?: never;
         /**
          * Add Turbine
-         * @description Add a turbine to the site file.
+         * @description Add a turbine to the site file; one that says what stops an axis from outside is an expert's.
          */
         post: operations["add_turbine"];
         delete?: never;
@@ -3638,7 +3700,7 @@ export interface paths {
         get?: never;
         /**
          * Change Turbine
-         * @description Change a turbine of the site file; slugs are permanent.
+         * @description Change a turbine of the site file; slugs are permanent. What stops an axis from outside is changed by experts.
          */
         put: operations["change_turbine"];
         post?: never;
@@ -4456,7 +4518,8 @@ export interface components {
          * BusDoc
          * @description A bus of a turbine; ``bitrate`` 0: the connection names it.
          *
-         *     ``heartbeat_node``: as whom this tool beats on it while axes are moved.
+         *     ``heartbeat_node``: as whom this tool beats on it while axes are moved. ``connection`` ``modbus-tcp``: its devices
+         *     have addresses, all within ``ranges``; it has no bit rate (0) then.
          */
         BusDoc: {
             /** Bitrate */
@@ -4470,6 +4533,11 @@ export interface components {
             heartbeat_node: number;
             /** Name */
             name: string;
+            /**
+             * Ranges
+             * @default []
+             */
+            ranges: string[];
         };
         /**
          * BusIdentifier
@@ -4538,10 +4606,13 @@ export interface components {
          * BusNode
          * @description One node that was seen, or that the site names. ``nmt`` is the text key of its state.
          *
-         *     ``device_name`` is what it said of itself (1008h). ``sdo_per_node`` counts transfers; ``other_client_t_ns`` is the
-         *     latest one that was not ours.
+         *     ``device_name`` is what it said of itself (1008h). Not ``managed``: its bus has neither states nor heartbeats; then
+         *     ``answered_t_ns``, its latest answer to anybody, tells that it is there. ``sdo_count`` counts transfers;
+         *     ``other_client_t_ns`` is the latest one that was not ours.
          */
         BusNode: {
+            /** Answered T Ns */
+            answered_t_ns: number | null;
             /** Boots */
             boots: number;
             /** Bus */
@@ -4564,6 +4635,8 @@ export interface components {
             heartbeat_t_ns: number | null;
             /** Load */
             load: number;
+            /** Managed */
+            managed: boolean;
             /** Nmt */
             nmt: string | null;
             /** Node */
@@ -4888,14 +4961,20 @@ export interface components {
         };
         /**
          * ConfirmRequest
-         * @description What the holder has looked at.
+         * @description What the holder has looked at. ``external_stops``: devices whose stop by hand an expert answers for.
          * @example {
+         *       "external_stops": [],
          *       "fence": 1764029382123456,
          *       "people_out": true,
          *       "rotor_locked": true
          *     }
          */
         ConfirmRequest: {
+            /**
+             * External Stops
+             * @default []
+             */
+            external_stops: string[];
             /** Fence */
             fence: number;
             /** People Out */
@@ -5033,9 +5112,14 @@ export interface components {
         };
         /**
          * DescriptionRef
-         * @description A description that devices may name.
+         * @description A description that devices of a bus of this kind may name.
          */
         DescriptionRef: {
+            /**
+             * Bus
+             * @enum {string}
+             */
+            bus: "canopen" | "modbus-tcp";
             /** Id */
             id: string;
             /** Name */
@@ -5069,9 +5153,11 @@ export interface components {
         };
         /**
          * DeviceRef
-         * @description One device: ``slug`` is its whole path.
+         * @description One device: ``slug`` is its whole path, ``axis`` tells whether it has a controlword.
          */
         DeviceRef: {
+            /** Axis */
+            axis: boolean;
             /** Description Id */
             description_id: string;
             /** Name */
@@ -5844,20 +5930,63 @@ export interface components {
         };
         /**
          * HomeRequest
-         * @description Take the present position for this angle.
+         * @description Take the present position for this one.
          * @example {
-         *       "angle_deg": 90,
          *       "fence": 1764029382123456,
-         *       "order": 4
+         *       "order": 4,
+         *       "position": 90
          *     }
          */
         HomeRequest: {
-            /** Angle Deg */
-            angle_deg: number;
             /** Fence */
             fence: number;
             /** Order */
             order: number;
+            /** Position */
+            position: number;
+        };
+        /**
+         * HomedDoc
+         * @description Where the axis stands after homing, in the unit of 6064h.
+         */
+        HomedDoc: {
+            /** Position */
+            position: number;
+            /** Why */
+            why: string;
+        };
+        /**
+         * IdentifiedDoc
+         * @description The device at an address, as it says itself; null where it does not say. ``twin``: it is simulated.
+         */
+        IdentifiedDoc: {
+            /** Address */
+            address: string;
+            /** Description Id */
+            description_id: string | null;
+            /** Device Name */
+            device_name: string | null;
+            /** Hardware */
+            hardware: string | null;
+            /** Serial */
+            serial: string | null;
+            /** Software */
+            software: string | null;
+            /** Twin */
+            twin: boolean;
+            /** Variant */
+            variant: string | null;
+        };
+        /**
+         * IdentifyRequest
+         * @description One address of Modbus TCP, HOST[:PORT][/UNIT]; a bus of the site must allow it.
+         * @example {
+         *       "address": "192.168.2.20"
+         *     }
+         */
+        IdentifyRequest: {
+            /** Address */
+            address: string;
         };
         /**
          * InForce
@@ -6193,11 +6322,11 @@ export interface components {
         JobState: "running" | "done" | "failed" | "cancelled";
         /**
          * JogRequest
-         * @description Turn the blade at a speed while it is held; negative: towards 0 degrees.
+         * @description Turn the axis at a speed while it is held; at a blade negative is towards 0 degrees.
          * @example {
          *       "fence": 1764029382123456,
          *       "order": 2,
-         *       "speed_dps": -2
+         *       "speed": -2
          *     }
          */
         JogRequest: {
@@ -6205,8 +6334,8 @@ export interface components {
             fence: number;
             /** Order */
             order: number;
-            /** Speed Dps */
-            speed_dps: number;
+            /** Speed */
+            speed: number;
         };
         /**
          * KeptDevice
@@ -6699,13 +6828,16 @@ export interface components {
          * MotionLine
          * @description ``available`` False: nothing is connected that could move, or this is a recording.
          *
-         *     ``refused``: the page whose wish for the lease was refused last. ``left``: devices where settings still stand that
-         *     were changed for motion, by a server that was killed or a bus that was lost.
+         *     ``refused``: the page whose wish for the lease was refused last. ``external_stops``: devices whose stop by hand an
+         *     expert answers for. ``left``: devices where settings still stand that were changed for motion, by a server that was
+         *     killed or a bus that was lost.
          */
         MotionLine: {
             /** Available */
             available: boolean;
             ended: components["schemas"]["EndedLine"] | null;
+            /** External Stops */
+            external_stops: string[];
             holder: components["schemas"]["LeaseLine"] | null;
             /** Left */
             left: string[];
@@ -6937,23 +7069,23 @@ export interface components {
         };
         /**
          * MoveRequest
-         * @description Move the blade to an angle while it is held.
+         * @description Move the axis to a position while it is held.
          * @example {
-         *       "angle_deg": 45,
          *       "fence": 1764029382123456,
          *       "order": 3,
-         *       "speed_dps": 2
+         *       "position": 45,
+         *       "speed": 2
          *     }
          */
         MoveRequest: {
-            /** Angle Deg */
-            angle_deg: number;
             /** Fence */
             fence: number;
             /** Order */
             order: number;
-            /** Speed Dps */
-            speed_dps: number;
+            /** Position */
+            position: number;
+            /** Speed */
+            speed: number;
         };
         /**
          * MovedDoc
@@ -7132,8 +7264,13 @@ export interface components {
         /**
          * NodeLine
          * @description One device as network management sees it. ``silent``: its heartbeat is overdue, so its state is unknown.
+         *
+         *     Not ``managed``: its bus has neither states nor heartbeats; then ``answered_t_ns``, the latest answer that it gave
+         *     to anybody, tells that it is there.
          */
         NodeLine: {
+            /** Answered T Ns */
+            answered_t_ns: number | null;
             /** Boots */
             boots: number;
             /** Device */
@@ -7142,6 +7279,8 @@ export interface components {
             heartbeat_period_ms: number | null;
             /** Heartbeat T Ns */
             heartbeat_t_ns: number | null;
+            /** Managed */
+            managed: boolean;
             /**
              * Nmt
              * @enum {string}
@@ -7872,6 +8011,8 @@ export interface components {
         /**
          * PollBus
          * @description A bus of a known turbine, and how much of its time polling takes (0..1); ``counts`` of devices by description.
+         *
+         *     One without a bit rate (0), as of Modbus TCP, has no such share: null.
          */
         PollBus: {
             /** Bitrate */
@@ -7883,7 +8024,7 @@ export interface components {
                 [key: string]: number;
             };
             /** Load */
-            load: number;
+            load: number | null;
             /** Turbine */
             turbine: string;
         };
@@ -7995,21 +8136,21 @@ export interface components {
         };
         /**
          * PreparedDoc
-         * @description The proof: so long after our last heartbeat the axis had stopped by itself.
+         * @description The proof: so long after our last heartbeat the axis had stopped by itself; null where its bus has none.
          */
         PreparedDoc: {
             /** Proof Ms */
-            proof_ms: number;
+            proof_ms: number | null;
         };
         /**
          * PreparedLine
-         * @description An axis that may move: so long after our last heartbeat it had stopped by itself.
+         * @description An axis that may move: so long after our last heartbeat it had stopped by itself; None where it does not.
          */
         PreparedLine: {
             /** Device */
             device: string;
             /** Proof Ms */
-            proof_ms: number;
+            proof_ms: number | null;
         };
         /**
          * PresentVisit
@@ -9248,6 +9389,23 @@ export interface components {
             trying: number | null;
         };
         /**
+         * SearchHomeRequest
+         * @description Home by a method of 6098h while it is held.
+         * @example {
+         *       "fence": 1764029382123456,
+         *       "method": 17,
+         *       "order": 5
+         *     }
+         */
+        SearchHomeRequest: {
+            /** Fence */
+            fence: number;
+            /** Method */
+            method: number;
+            /** Order */
+            order: number;
+        };
+        /**
          * SearchRequest
          * @description Which adapter.
          * @example {
@@ -9512,7 +9670,9 @@ export interface components {
         };
         /**
          * SettingsJobDoc
-         * @description Work on an adapter. One of ``heard``, ``search`` and ``scan`` is given as soon as there is anything to tell.
+         * @description Work on an adapter or an address.
+         *
+         *     One of ``heard``, ``search``, ``scan`` and ``identified`` is given as soon as there is anything to tell.
          */
         SettingsJobDoc: {
             /** Done */
@@ -9521,6 +9681,7 @@ export interface components {
             heard: components["schemas"]["HeardDoc"] | null;
             /** Id */
             id: string;
+            identified: components["schemas"]["IdentifiedDoc"] | null;
             /** Kind */
             kind: string;
             scan: components["schemas"]["ScanDoc"] | null;
@@ -9829,12 +9990,25 @@ export interface components {
         /**
          * SiteDeviceDoc
          * @description A device; ``slug`` is its own part of the path.
+         *
+         *     ``address`` (HOST[:PORT][/UNIT]) is where it listens on Modbus TCP. ``external_stop`` says what stops this axis from
+         *     outside where its bus cannot prove that it stops by itself; experts change it.
          */
         SiteDeviceDoc: {
+            /**
+             * Address
+             * @default
+             */
+            address: string;
             /** Bus */
             bus: string;
             /** Description Id */
             description_id: string;
+            /**
+             * External Stop
+             * @default
+             */
+            external_stop: string;
             /** Name */
             name: string;
             /** Node */
@@ -10296,6 +10470,9 @@ export interface components {
         /**
          * TraceLine
          * @description One frame, or a gap in the traffic. ``start_t_ns``: the first request of the transfer that this frame ended.
+         *
+         *     Of Modbus TCP ``transaction`` is set, ``peer`` is the client's end of the connection, ``number`` the function
+         *     code and ``dlc`` the bytes of the ADU; ``can_id`` is 0.
          */
         TraceLine: {
             /** Bus */
@@ -10323,6 +10500,8 @@ export interface components {
             notes: components["schemas"]["TraceNote"][];
             /** Number */
             number: number;
+            /** Peer */
+            peer: string | null;
             /** Remote */
             remote: boolean;
             /** Service */
@@ -10340,6 +10519,8 @@ export interface components {
              * @enum {string}
              */
             tone: "plain" | "warning" | "error";
+            /** Transaction */
+            transaction: number | null;
         };
         /**
          * TraceMessage
@@ -10756,6 +10937,35 @@ export interface components {
          */
         Verdict: "passed" | "failed" | "refused" | "broken_off" | "unwatched" | "lost" | "timed_out";
         /**
+         * VerifyDone
+         * @description ``objects``: how many the description has. No finding: the device is as it is described.
+         */
+        VerifyDone: {
+            /** Findings */
+            findings: components["schemas"]["VerifyFinding"][];
+            /** Objects */
+            objects: number;
+            /** T Ns */
+            t_ns: number;
+        };
+        /**
+         * VerifyFinding
+         * @description One difference. ``expected`` and ``found`` count sub-indices, bytes or bits, or are a value; null is nothing.
+         */
+        VerifyFinding: {
+            /** Address */
+            address: string;
+            /**
+             * Deviation
+             * @enum {string}
+             */
+            deviation: "missing" | "extra" | "subs" | "size" | "not_ready" | "mapping";
+            /** Expected */
+            expected: number | null;
+            /** Found */
+            found: number | null;
+        };
+        /**
          * VisitChange
          * @description What is to change; null stays as it is.
          */
@@ -10847,12 +11057,36 @@ export interface components {
         /**
          * WriteRequest
          * @description ``raw``: a number, a text, or octets as hexadecimal digits.
+         *
+         *     ``address_confirmed``: the person knows that the device will be found at another network address.
          */
         WriteRequest: {
             /** Address */
             address: string;
+            /**
+             * Address Confirmed
+             * @default false
+             */
+            address_confirmed: boolean;
             /** Raw */
             raw: number | string;
+        };
+        /**
+         * WritesAddressChange
+         * @description A device that will be found elsewhere once it was saved and restarted; its rows need a confirmation.
+         *
+         *     ``connected``: where it is reached now. ``site_address``: what the site file must name then; null where nobody can
+         *     tell beforehand (DHCP, or the bus itself is switched).
+         */
+        WritesAddressChange: {
+            /** Addresses */
+            addresses: string[];
+            /** Connected */
+            connected: string;
+            /** Device */
+            device: string;
+            /** Site Address */
+            site_address: string | null;
         };
         /**
          * WritesPlan
@@ -10862,6 +11096,8 @@ export interface components {
          *     all is written. ``unknown``: not known yet, and read before the first write, so that the order may become another.
          */
         WritesPlan: {
+            /** Address Changes */
+            address_changes: components["schemas"]["WritesAddressChange"][];
             /** Broken */
             broken: components["schemas"]["RuleFinding"][];
             /** Rows */
@@ -10898,6 +11134,8 @@ export interface components {
          * @description ``save`` names the devices whose verified values are made permanent; with "stop" nothing follows a failure.
          *
          *     ``accepted``: rules that hold after every write elsewhere may be broken on the way where they are broken in the end.
+         *     ``address_confirmed``: the person knows that the device will be found at another address (``address_changes`` of the
+         *     plan); without it what decides the address is refused.
          */
         WritesRequest: {
             /**
@@ -10905,6 +11143,11 @@ export interface components {
              * @default false
              */
             accepted: boolean;
+            /**
+             * Address Confirmed
+             * @default false
+             */
+            address_confirmed: boolean;
             /**
              * On Failure
              * @default stop
@@ -14988,9 +15231,9 @@ export interface operations {
             content: {
                 /**
                  * @example {
-                 *       "angle_deg": 90,
                  *       "fence": 1764029382123456,
-                 *       "order": 4
+                 *       "order": 4,
+                 *       "position": 90
                  *     }
                  */
                 "application/json": components["schemas"]["HomeRequest"];
@@ -15202,7 +15445,7 @@ export interface operations {
                  * @example {
                  *       "fence": 1764029382123456,
                  *       "order": 2,
-                 *       "speed_dps": -2
+                 *       "speed": -2
                  *     }
                  */
                 "application/json": components["schemas"]["JogRequest"];
@@ -15316,10 +15559,10 @@ export interface operations {
             content: {
                 /**
                  * @example {
-                 *       "angle_deg": 45,
                  *       "fence": 1764029382123456,
                  *       "order": 3,
-                 *       "speed_dps": 2
+                 *       "position": 45,
+                 *       "speed": 2
                  *     }
                  */
                 "application/json": components["schemas"]["MoveRequest"];
@@ -15966,6 +16209,122 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["MovedDoc"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Conflict */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Bad Gateway */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Service Unavailable */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Gateway Timeout */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    find_home: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                turbine: string;
+                station: string;
+                device: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "fence": 1764029382123456,
+                 *       "method": 17,
+                 *       "order": 5
+                 *     }
+                 */
+                "application/json": components["schemas"]["SearchHomeRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HomedDoc"];
                 };
             };
             /** @description Unauthorized */
@@ -17309,6 +17668,116 @@ export interface operations {
             };
         };
     };
+    verify_device: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                turbine: string;
+                station: string;
+                device: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /** @example {} */
+                "application/json": components["schemas"]["Nothing"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["VerifyDone"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Conflict */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Bad Gateway */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Service Unavailable */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Gateway Timeout */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
     write: {
         parameters: {
             query?: never;
@@ -17807,6 +18276,7 @@ export interface operations {
             content: {
                 /**
                  * @example {
+                 *       "external_stops": [],
                  *       "fence": 1764029382123456,
                  *       "people_out": true,
                  *       "rotor_locked": true
@@ -24740,6 +25210,71 @@ export interface operations {
                  *     }
                  */
                 "application/json": components["schemas"]["TestRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SettingsJobDoc"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    start_identify: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "address": "192.168.2.20"
+                 *     }
+                 */
+                "application/json": components["schemas"]["IdentifyRequest"];
             };
         };
         responses: {

@@ -8,6 +8,7 @@ type Schemas = components["schemas"];
 
 export type Lease = Schemas["LeaseDoc"];
 export type Interlock = Schemas["InterlockDoc"];
+export type Homed = Schemas["HomedDoc"];
 export type Moved = Schemas["MovedDoc"];
 export type Positions = Schemas["Positions"];
 export type Prepared = Schemas["PreparedDoc"];
@@ -40,18 +41,26 @@ export const moving = {
   answer: (fence: number, handOver: boolean) =>
     send<MotionData>("POST", `${ROOT}/lease/answer`, { fence, hand_over: handOver }),
   giveBack: (fence: number) => send<MotionData>("POST", `${ROOT}/lease/give-back`, { fence }),
-  confirm: (fence: number, rotorLocked: boolean, peopleOut: boolean) =>
-    send<MotionData>("POST", `${ROOT}/confirm`, { fence, rotor_locked: rotorLocked, people_out: peopleOut }),
+  confirm: (fence: number, rotorLocked: boolean, peopleOut: boolean, externalStops: readonly string[]) =>
+    send<MotionData>("POST", `${ROOT}/confirm`, {
+      fence,
+      rotor_locked: rotorLocked,
+      people_out: peopleOut,
+      external_stops: externalStops,
+    }),
   prepare: (slug: string, order: Order) => send<Prepared>("POST", `${axis(slug)}/prepare`, order),
   putBack: (slug: string, order: Order) => send<MotionData>("POST", `${axis(slug)}/put-back`, order),
   /** Where both encoders say that the blade is, asked now. */
   positions: (slug: string) => get<Positions>(`${axis(slug)}/positions`),
-  jog: (slug: string, order: Order, speedDps: number) =>
-    send<Moved>("POST", `${axis(slug)}/jog`, { ...order, speed_dps: speedDps }),
-  move: (slug: string, order: Order, angleDeg: number, speedDps: number) =>
-    send<Moved>("POST", `${axis(slug)}/move`, { ...order, angle_deg: angleDeg, speed_dps: speedDps }),
-  home: (slug: string, order: Order, angleDeg: number) =>
-    send<Moved>("POST", `${axis(slug)}/home`, { ...order, angle_deg: angleDeg }),
+  /** Positions and speeds in the units of 607Ah and 60FFh: ° and °/s at a blade. */
+  jog: (slug: string, order: Order, speed: number) =>
+    send<Moved>("POST", `${axis(slug)}/jog`, { ...order, speed }),
+  move: (slug: string, order: Order, position: number, speed: number) =>
+    send<Moved>("POST", `${axis(slug)}/move`, { ...order, position, speed }),
+  home: (slug: string, order: Order, position: number) =>
+    send<Moved>("POST", `${axis(slug)}/home`, { ...order, position }),
+  searchHome: (slug: string, order: Order, method: number) =>
+    send<Homed>("POST", `${axis(slug)}/search-home`, { ...order, method }),
   hold: (slug: string, order: Order) => send<Moved>("POST", `${axis(slug)}/hold`, order),
   feather: (slug: string, order: Order) => send<Feathered>("POST", `${axis(slug)}/feather`, order),
   brakeTest: (slug: string, order: Order) => send<BrakeTest>("POST", `${axis(slug)}/brake-test`, order),

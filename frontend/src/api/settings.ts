@@ -12,6 +12,7 @@ export type SettingsJob = Schemas["SettingsJobDoc"];
 export type Heard = Schemas["HeardDoc"];
 export type BitrateSearch = Schemas["SearchDoc"];
 export type Scan = Schemas["ScanDoc"];
+export type Identified = Schemas["IdentifiedDoc"];
 export type FoundDevice = Schemas["FoundDoc"];
 export type Site = Schemas["SiteDoc"];
 export type SiteTurbine = Schemas["SiteTurbineDoc"];
@@ -128,6 +129,7 @@ export const settings = {
   search: (connection: string) => send<SettingsJob>("POST", `${ROOT}/adapters/bitrate`, { connection }),
   scan: (connection: string, bitrate: number, consent: boolean) =>
     send<SettingsJob>("POST", `${ROOT}/scan`, { connection, bitrate, consent }),
+  identify: (address: string) => send<SettingsJob>("POST", `${ROOT}/identify`, { address }),
   addTurbine: (revision: string, turbine: SiteTurbine) =>
     send<Site>("POST", `${ROOT}/site/turbines`, { revision, turbine }),
   changeTurbine: (revision: string, turbine: SiteTurbine) =>

@@ -25,6 +25,7 @@ export type WritesRequest = Schemas["WritesRequest"];
 export type WriteResult = Schemas["WriteDone"];
 export type SaveResult = Schemas["SaveDone"];
 export type RestartResult = Schemas["RestartDone"];
+export type VerifyResult = Schemas["VerifyDone"];
 export type StopResult = Schemas["StopDone"];
 
 export type ServerMessage = Schemas["ServerMessage"];
@@ -86,8 +87,6 @@ export interface EntryDoc extends QuantityDoc {
   default: RawDoc | null;
   node_id: boolean;
   saved: boolean;
-  /** What saves it, where the device saves by categories; null goes with each save. */
-  save_category: string | null;
   group: string;
   section: string;
   unit_from: { address: string; shaft: string | null; choices: Record<string, QuantityDoc> } | null;
@@ -99,9 +98,16 @@ export interface EntryDoc extends QuantityDoc {
   bits: string | null;
   restore: "copy" | "unit" | "factory" | "network" | "never";
   verify: "equal" | "ack" | "effect";
-  requires: { address: string; values: number[] }[];
+  /** `writing`: asked of writes of these raw values only; empty or missing for all. */
+  requires: { address: string; values: number[]; writing?: number[] }[];
   note: string | null;
+  /** The save category that keeps it, where a device saves by categories. */
+  save_category: string | null;
+  by_variant: Record<string, { default: RawDoc | null; minimum: LimitDoc | null; maximum: LimitDoc | null }>;
+  /** Its manual does not print all of it: what not is in `unproven` (nothing named: all), `origin` tells it instead. */
   inferred: boolean;
+  unproven: string[];
+  origin: string | null;
   /** A write can set an axis in motion. */
   motion: boolean;
   hexadecimal: boolean;
@@ -145,6 +151,11 @@ export interface DescriptionDoc {
   bit_tables: Record<string, BitDoc[]>;
   enumerations: Record<string, EnumerationDoc>;
   errors: ErrorDoc[];
-  save: { address: string; category: string | null }[];
   entries: EntryDoc[];
+  /** What makes RAM permanent; `category` null: all of it. */
+  save: { address: string; category: string | null }[];
+  /** Devices that share this description, and how each is known. */
+  variant_matches: { id: string; name: string; device_name: string | null; product_code: number | null }[];
+  /** Titles of what tells facts that the device's own manual does not print, by id. */
+  sources: Record<string, string>;
 }

@@ -6,7 +6,9 @@ import {
   IconLayoutSidebarRightExpand,
   IconPlugConnectedX,
 } from "@tabler/icons-react";
-import { useEffect, useRef, useState } from "react";
+import { useQuery } from "@tanstack/react-query";
+import { useEffect, useMemo, useRef, useState } from "react";
+import { useTurbineQuery } from "../api/queries";
 import { replayOf } from "../live/channel";
 import { useShown } from "../live/live";
 import { useTexts } from "../texts/texts";
@@ -14,7 +16,14 @@ import classes from "./SceneDock.module.css";
 import { Facts } from "./SceneDockFacts";
 import { Labels, type LabelPlacer } from "./SceneDockLabels";
 import { Legend } from "./SceneDockLooks";
-import { CAMERAS, type CameraName, tellScene, useSceneMessages, type View } from "./sceneDockBridge";
+import {
+  BENCH_CAMERA,
+  CAMERAS,
+  type CameraName,
+  tellScene,
+  useSceneMessages,
+  type View,
+} from "./sceneDockBridge";
 import { usePageSearch } from "./search";
 import { stopOnEscape } from "./stop";
 
@@ -77,10 +86,13 @@ function SceneView() {
   // The frame's script tells that it is there before the frame counts as loaded: what is silent is no 3D view.
   const alive = useRef(false);
   const [attempt, setAttempt] = useState(0);
-  const view = useView();
+  const cameras = useCameras();
+  const view = useView(cameras);
   // The frame gets its first view by its address; what changes later it is told, without being loaded again.
   const { ctx } = useShown();
-  const [address] = useState(() => addressOf(view, ctx));
+  const known = useQuery(useTurbineQuery()).isFetched;
+  const [address, setAddress] = useState<string | null>(null);
+  if (known && address === null) setAddress(addressOf(view, ctx));
 
   const select = (blade: number | null) => update({ blade: blade === null ? undefined : String(blade) });
   useSceneMessages(frame, (message) => {
@@ -97,7 +109,7 @@ function SceneView() {
   const fly = (camera: CameraName) => {
     setFreed(false);
     tellScene(frame.current, { ...view, camera }, true);
-    update({ camera: camera === "front" ? undefined : camera });
+    update({ camera: camera === cameras[0] ? undefined : camera });
   };
   const loaded = () => {
     // The frame is of our own origin: Esc must stop there as well.
@@ -115,7 +127,7 @@ function SceneView() {
     <>
       <div className={`${classes.body} bench`} data-link={link} data-theme={view.theme}>
         {link === Link.Loading && <div className={classes.wait}>{t("page.scene.loading")}</div>}
-        {ready && looked && (
+        {ready && looked && address !== null && (
           <iframe
             key={attempt}
             ref={frame}
@@ -129,19 +141,32 @@ function SceneView() {
         {link === Link.Lost && <Lost />}
       </div>
       <div className={classes.foot}>
-        <Cameras chosen={freed ? null : view.camera} onChoose={fly} />
-        <GhostSwitch on={view.ghosts} onChange={(on) => update({ ghost: on ? undefined : "off" })} />
+        <Cameras cameras={cameras} chosen={freed ? null : view.camera} onChoose={fly} />
+        {cameras.includes("front") && (
+          <GhostSwitch on={view.ghosts} onChange={(on) => update({ ghost: on ? undefined : "off" })} />
+        )}
       </div>
-      <Facts />
-      <Legend />
+      {cameras.includes("front") && <Facts />}
+      <Legend ghost={cameras.includes("front")} />
     </>
   );
 }
 
-function useView(): View {
+/** Where one can look from: at blades, at an axis on a bench, or at both where there is both. */
+function useCameras(): readonly CameraName[] {
+  const stations = useQuery(useTurbineQuery()).data?.stations ?? [];
+  const blades = stations.length === 0 || stations.some((station) => station.blade !== null);
+  const bench = stations.some((station) => station.blade === null);
+  return useMemo(
+    () => CAMERAS.filter((camera) => (camera === BENCH_CAMERA ? bench : blades)),
+    [bench, blades],
+  );
+}
+
+function useView(cameras: readonly CameraName[]): View {
   const [search] = usePageSearch();
   const theme = useComputedColorScheme();
-  const camera = CAMERAS.find((name) => name === search.camera) ?? "front";
+  const camera = cameras.find((name) => name === search.camera) ?? cameras[0] ?? "front";
   const selected = Number(search.blade ?? 0) || null;
   const ghosts = search.ghost !== "off";
   const [view, setView] = useState<View>({ theme, camera, selected, ghosts });
@@ -172,16 +197,18 @@ function Lost() {
 }
 
 function Cameras({
+  cameras,
   chosen,
   onChoose,
 }: {
+  cameras: readonly CameraName[];
   chosen: CameraName | null;
   onChoose: (camera: CameraName) => void;
 }) {
   const t = useTexts();
   return (
     <div className={classes.cameras} role="group" aria-label={t("page.scene.cameras")}>
-      {CAMERAS.map((camera) => {
+      {cameras.map((camera) => {
         const name = t(`page.scene.camera.${camera}`);
         const short = camera.startsWith("blade-") ? camera.slice(-1) : name;
         return (

@@ -1,16 +1,22 @@
 import { type Ref, useImperativeHandle, useRef } from "react";
+import { useQueries, useQuery } from "@tanstack/react-query";
+import { useDescriptionQuery, useTurbineQuery } from "../api/queries";
 import type { AxisData } from "../api/types";
-import { useAxes } from "../live/live";
+import { useAxes, useWatchDevice } from "../live/live";
+import { axisStateKey, shaftLook } from "../model/axisState";
 import { figure } from "../model/values";
 import { useTexts } from "../texts/texts";
+import { type Place, placesOf, stationName } from "../ui/devices";
 import { timeOfDay } from "../ui/format";
+import { entriesOf, useDeviceContext, useReading } from "../ui/reading";
 import { LookSign } from "./SceneDockLooks";
 import classes from "./SceneDock.module.css";
-import { arranged, type CameraName, type Places } from "./sceneDockBridge";
+import { arranged, BENCH_CAMERA, type CameraName, type Places } from "./sceneDockBridge";
 
 const BLADES = [1, 2, 3];
 const MARKS = [0, 90, 95];
 const FEATHER = 90;
+const [POSITION, STATUSWORD, ERROR_CODE] = ["6064", "6041", "603F"] as const;
 
 export interface LabelPlacer {
   place: (places: Places) => void;
@@ -28,7 +34,8 @@ export function Labels({ camera, selected, onSelect, ref }: Props) {
   const t = useTexts();
   const layer = useRef<HTMLDivElement>(null);
   const near = nearBlade(camera);
-  const shown = near === null ? BLADES : [near];
+  const shown = camera === BENCH_CAMERA ? [] : near === null ? BLADES : [near];
+  const shafts = useShafts(camera === BENCH_CAMERA);
   // Places come with every move of camera or rotor: they are set without rendering anything anew.
   useImperativeHandle(
     ref,
@@ -45,6 +52,9 @@ export function Labels({ camera, selected, onSelect, ref }: Props) {
           selected={blade === selected}
           onSelect={onSelect}
         />
+      ))}
+      {shafts.map((place, at) => (
+        <ShaftLabel key={place.device.slug} place={place} number={at + 1} />
       ))}
       {near !== null &&
         MARKS.map((degrees) => (
@@ -90,6 +100,49 @@ function BladeLabel({ blade, place, selected, onSelect }: BladeLabelProps) {
       <span className={classes.angle}>{angle}</span>
       <span className={classes.state}>{stateWord(t, axis, look)}</span>
     </button>
+  );
+}
+
+/** The axes that stand on a bench, in the order in which the 3D view numbers them. */
+function useShafts(wanted: boolean): Place[] {
+  const turbine = useQuery(useTurbineQuery()).data;
+  const describe = useDescriptionQuery();
+  const places = wanted ? placesOf(turbine).filter(({ station }) => station.blade === null) : [];
+  const docs = useQueries({ queries: places.map(({ device }) => describe(device.description_id)) });
+  return places.filter((_, at) => {
+    const doc = docs[at]?.data;
+    return doc !== undefined && entriesOf(doc).has(STATUSWORD) && entriesOf(doc).has(POSITION);
+  });
+}
+
+function ShaftLabel({ place: { device, station }, number }: { place: Place; number: number }) {
+  const t = useTexts();
+  useWatchDevice(device.slug);
+  const context = useDeviceContext(device);
+  const position = useReading(context, POSITION, "fast");
+  const status = useReading(context, STATUSWORD, "fast");
+  const fault = useReading(context, ERROR_CODE, "slow");
+  const word = typeof status?.raw === "number" ? status.raw : null;
+  const code = typeof fault?.raw === "number" ? fault.raw : null;
+  const look = position === null ? "unknown" : position.stale ? "stale" : shaftLook(word, code);
+  const state = word === null ? null : axisStateKey(word);
+  return (
+    <span
+      className={classes.label}
+      data-look={look}
+      data-place={`shaft-${number}`}
+      data-blade={number}
+      data-testid={`scene-shaft-${number}`}
+    >
+      <LookSign look={look} />
+      <b>{stationName(station, t)}</b>
+      <span className={classes.angle}>
+        {position === null ? "–" : `${position.text}${position.unit === "°" ? "" : " "}${position.unit}`}
+      </span>
+      <span className={classes.state}>
+        {state === null || look === "stale" || look === "unknown" ? t(`page.look.${look}`) : t(state)}
+      </span>
+    </span>
   );
 }
 

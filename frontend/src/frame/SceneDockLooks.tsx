@@ -33,7 +33,7 @@ export function LookSign({ look }: { look: Look }) {
   );
 }
 
-export function Legend() {
+export function Legend({ ghost }: { ghost: boolean }) {
   const t = useTexts();
   return (
     <ul className={classes.legend} aria-label={t("page.scene.legend")} data-testid="scene-legend">
@@ -43,12 +43,14 @@ export function Legend() {
           {t(`page.look.${look}`)}
         </li>
       ))}
-      <li>
-        <span className={classes.sign} data-look="ghost" aria-hidden>
-          <IconGhost2 size={13} stroke={2.4} />
-        </span>
-        {t("page.look.ghost")}
-      </li>
+      {ghost && (
+        <li>
+          <span className={classes.sign} data-look="ghost" aria-hidden>
+            <IconGhost2 size={13} stroke={2.4} />
+          </span>
+          {t("page.look.ghost")}
+        </li>
+      )}
     </ul>
   );
 }

@@ -1,11 +1,13 @@
 import { Tooltip } from "@mantine/core";
-import { useQuery } from "@tanstack/react-query";
-import { turbineQuery } from "../api/queries";
+import { useQueries, useQuery } from "@tanstack/react-query";
+import { descriptionQuery, turbineQuery } from "../api/queries";
 import { IconHandStop, IconWind } from "@tabler/icons-react";
 import { useAxes, useHearing, useLink } from "../live/live";
 import { useTexts } from "../texts/texts";
 import classes from "./Frame.module.css";
 import { mayMove } from "../live/axis";
+import { placesOf } from "../ui/devices";
+import { entriesOf } from "../ui/reading";
 import { usePageSearch } from "./search";
 import { Halt, useHalt, useLendStop } from "./stop";
 
@@ -20,6 +22,7 @@ export function StopButtons() {
   const turbine = useQuery(turbineQuery).data?.name;
   const [search] = usePageSearch();
   useLendStop(stop.mutate);
+  const feathers = useFeathers();
   const nothing = !deaf && link?.state === "disconnected";
   return (
     <div className={classes.stops} role="group" aria-label={t("page.stop.group")}>
@@ -34,16 +37,16 @@ export function StopButtons() {
           )}
         </span>
       )}
-      <Tooltip label={t("page.feather.explain")}>
+      <Tooltip label={t(feathers ? "page.feather.explain" : "page.feather.none")}>
         <button
           type="button"
           className={classes.feather}
-          disabled={nothing}
+          disabled={nothing || !feathers}
           data-testid="feather"
           onClick={() => feather.mutate()}
         >
           <IconWind size={20} aria-hidden />
-          {t("page.feather.button")}
+          {feathers ? t("page.feather.button") : `${t("page.feather.button")} –`}
         </button>
       </Tooltip>
       <Tooltip label={t("page.stop.explain")}>
@@ -62,4 +65,15 @@ export function StopButtons() {
       </Tooltip>
     </div>
   );
+}
+
+/** Holds the way to feather of an axis that has one (CiA 402, home to position: 567Ah). */
+const FEATHER_OBJECT = "567A";
+
+/** False only where every device that is connected is known to have no feather position. */
+function useFeathers(): boolean {
+  const devices = placesOf(useQuery(turbineQuery).data).map((place) => place.device);
+  const ids = [...new Set(devices.map((device) => device.description_id))];
+  const docs = useQueries({ queries: ids.map((id) => descriptionQuery(id)) });
+  return ids.length === 0 || docs.some(({ data }) => !data || entriesOf(data).has(FEATHER_OBJECT));
 }

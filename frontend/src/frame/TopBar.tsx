@@ -11,6 +11,8 @@ import {
   IconWifiOff,
 } from "@tabler/icons-react";
 import { useComputedColorScheme } from "@mantine/core";
+import { useQuery } from "@tanstack/react-query";
+import { useTurbineQuery } from "../api/queries";
 import type { LinkData, Mode, RecordingStatus } from "../api/types";
 import { useHearing, useLink, useLoadHistory, useServerNow } from "../live/live";
 import { figure } from "../model/values";
@@ -26,6 +28,8 @@ import { UserMenu } from "./UserMenu";
 import { usePageSearch } from "./search";
 
 const SECOND_MS = 1000;
+/** The top of the sparkline on a network: more than that of it no drive's traffic takes. */
+const NETWORK_LOAD = 0.01;
 
 export function TopBar() {
   const link = useLink();
@@ -70,21 +74,28 @@ function ModeBadge({ mode, connected }: { mode: Mode; connected: boolean }) {
 function BusFacts({ link }: { link: LinkData | null }) {
   const t = useTexts();
   const history = useLoadHistory();
+  const turbine = useQuery(useTurbineQuery()).data;
   if (!link || link.state === "disconnected") return null;
   const connected = link.state === "connected";
-  const load = t("page.bus.load", { load: figure(link.load * 100, 0, t.language).padStart(2, " ") });
+  const hasRate = link.bitrate > 0;
+  // What is much to a field bus is little to a network: its load is told more closely.
+  const load = t("page.bus.load", {
+    load: figure(link.load * 100, hasRate ? 0 : 1, t.language).padStart(2, " "),
+  });
   return (
     <div className={`${classes.record} bench`} data-testid="bus">
       <div className={classes.facts}>
         <strong>{connected ? load : t(`page.link.${link.state}`)}</strong>
         <span className="dim">
-          {t("page.bus.facts", { bus: link.bus, kbit: figure(link.bitrate / 1000, 0, t.language) })}
+          {hasRate
+            ? t("page.bus.facts", { bus: link.bus, kbit: figure(link.bitrate / 1000, 0, t.language) })
+            : t("page.bus.facts_network", { bus: link.bus, connection: turbine?.bus.interface ?? "" })}
         </span>
       </div>
       {connected && (
         <Sparkline
           values={history}
-          max={1}
+          max={hasRate ? 1 : NETWORK_LOAD}
           className={classes.sparkline ?? ""}
           label={t("page.bus.sparkline")}
         />

@@ -5,7 +5,9 @@
 import { type RefObject, useEffect, useEffectEvent } from "react";
 import type { Theme } from "./search";
 
-export const CAMERAS = ["front", "hub", "blade-1", "blade-2", "blade-3"] as const;
+export const CAMERAS = ["front", "hub", "blade-1", "blade-2", "blade-3", "shaft"] as const;
+/** Looks at what stands on a bench. */
+export const BENCH_CAMERA = "shaft";
 export type CameraName = (typeof CAMERAS)[number];
 
 /** What one view shows; others have their own. */

@@ -18,10 +18,14 @@ function press(key: string, repeat = false): boolean {
   return taken;
 }
 
-function tell(state: string | null, link: "connected" | "lost" | "disconnected" = "connected"): void {
+function tell(
+  state: string | null,
+  link: "connected" | "lost" | "disconnected" = "connected",
+  stale = false,
+): void {
   const envelope = { v: 1, ctx: "live", seq: 1, t_ns: 1e9 } as const;
   liveStore.apply({ ...envelope, type: "link", data: { state: link, load: 0 } as LinkData });
-  const axis = { blade: 1, state, stale: false, velocity_dps: 0 } as AxisData;
+  const axis = { blade: 1, state, stale, velocity_dps: 0 } as AxisData;
   liveStore.apply({ ...envelope, type: "axes", data: [axis] });
 }
 
@@ -51,6 +55,23 @@ describe("Esc", () => {
 
   it("is STOP where the state of an axis is not known", () => {
     tell(null);
+    expect(press("Escape")).toBe(true);
+    expect(stops).toBe(1);
+  });
+
+  it("is STOP where one bus of several is lost, and where the page has gone deaf: an axis may move since", () => {
+    tell("state.ready_to_switch_on", "lost");
+    expect(press("Escape")).toBe(true);
+    tell("state.ready_to_switch_on");
+    liveStore.setHearing({ state: "deaf", sinceMs: 1 });
+    expect(press("Escape")).toBe(true);
+    liveStore.setHearing({ state: "hearing", sinceMs: 2 });
+    expect(press("Escape")).toBe(false);
+    expect(stops).toBe(2);
+  });
+
+  it("is STOP where an axis stood when it was heard last", () => {
+    tell("state.ready_to_switch_on", "connected", true);
     expect(press("Escape")).toBe(true);
     expect(stops).toBe(1);
   });

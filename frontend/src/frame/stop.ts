@@ -67,10 +67,16 @@ export function useLendStop(stop: StopRequest): void {
   useEffect(() => lendStop(stop), [stop]);
 }
 
+/** True unless it is known that nothing can move: a lost bus need not be the only one, and who is deaf knows nothing. */
+function anythingMayMove(): boolean {
+  const link = liveStore.link;
+  if (!link || link.state === "disconnected" || liveStore.axes.size === 0) return false;
+  return link.state === "lost" || liveStore.hearing.state === "deaf" || mayMove(liveStore.axes.values());
+}
+
 /** While anything can move, Esc is STOP and nothing else. Taken in the capture phase, before any dialog sees it. */
 export function stopOnEscape(event: KeyboardEvent): void {
-  if (event.key !== "Escape" || liveStore.link?.state !== "connected" || !mayMove(liveStore.axes.values()))
-    return;
+  if (event.key !== "Escape" || !anythingMayMove()) return;
   event.preventDefault();
   event.stopImmediatePropagation();
   if (!event.repeat) stopNow?.();

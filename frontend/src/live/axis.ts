@@ -12,9 +12,10 @@ const AT_REST = [
 /** Name of the CiA 402 state: the last part of its text key. */
 const stateOf = (axis: AxisData): string | undefined => axis.state?.split(".").at(-1);
 
-/** True unless every axis is known to be without power and at rest: what is unknown may move. */
+/** True unless every axis is known to be without power and at rest: what is unknown, or was known once, may move. */
 export function mayMove(axes: Iterable<AxisData>): boolean {
   for (const axis of axes) {
+    if (axis.stale) return true;
     if (!AT_REST.includes(stateOf(axis) ?? "")) return true;
     if (Math.abs(axis.velocity_dps ?? 0) > STANDS_STILL_DPS) return true;
   }

@@ -28,10 +28,11 @@ const entry = (address: string, change: object = {}) =>
 const LOW = entry("30FB:08");
 const NOMINAL = entry("30FA:01", { minimum: { address: "30FB:08", factor: 1 } });
 const OFFSET = entry("607C", { requires: [{ address: "6061", values: [6] }], restore: "unit" });
+const MODE = entry("6060", { requires: [{ address: "6061", values: [6], writing: [1] }] });
 const HEATER = entry("3201:04", { bits: "out" });
 const COOLER = entry("3202:04", { bits: "out" });
 const DOC = {
-  entries: [LOW, NOMINAL, OFFSET, entry("6061"), HEATER, COOLER],
+  entries: [LOW, NOMINAL, OFFSET, MODE, entry("6061"), HEATER, COOLER],
   bit_tables: {
     out: [
       { bit: 0, last: 0, name: "a", text_key: "a", clamp: "X14.1", error_code: null },
@@ -93,6 +94,12 @@ describe("findings", () => {
     expect(kinds(planOf([change("607C", 5, 0)], ground({ "607C": 0 })))).toEqual([
       [FindingKind.UnknownPrecondition, FindingKind.Unit],
     ]);
+  });
+
+  it("ask a condition of the values only that it names", () => {
+    const known = ground({ "6060": 3, "6061": 9 });
+    expect(kinds(planOf([change("6060", 1, 3)], known))).toEqual([[FindingKind.Precondition]]);
+    expect(kinds(planOf([change("6060", 2, 3)], known))).toEqual([[]]);
   });
 
   it("name a clamp that another mask uses as well, also one that is pending", () => {

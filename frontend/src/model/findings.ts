@@ -79,13 +79,14 @@ function fitsNow({ address, raw }: Change, ground: Ground, lookup: Lookup): bool
   return (
     entry !== undefined &&
     misfitOf(ground.doc, entry, raw, lookup) === null &&
-    unmet(entry, lookup).length === 0
+    unmet(entry, raw, lookup).length === 0
   );
 }
 
-/** Conditions that are known not to hold. */
-const unmet = (entry: EntryDoc, lookup: Lookup) =>
-  entry.requires.filter(({ address, values }) => {
+/** Conditions of a write of `raw` that are known not to hold. */
+const unmet = (entry: EntryDoc, raw: Change["raw"], lookup: Lookup) =>
+  entry.requires.filter(({ address, values, writing = [] }) => {
+    if (writing.length > 0 && !(typeof raw === "number" && writing.includes(raw))) return false;
     const found = lookup(address);
     return typeof found === "number" && !values.includes(found);
   });
@@ -101,7 +102,7 @@ function ownFindings(change: Change, ground: Ground, lookup: Lookup): Finding[] 
   if (why === Misfit.NotListed) found.push(finding(FindingKind.NotListed, Weight.Stops, null, {}));
   else if (why !== null)
     found.push(finding(FindingKind.Limit, Weight.Stops, null, { ...limitsOf(entry, lookup) }));
-  for (const one of unmet(entry, lookup))
+  for (const one of unmet(entry, change.raw, lookup))
     found.push(finding(FindingKind.Precondition, Weight.Stops, one.address, { values: one.values }));
   if (entry.readable && ram !== null && change.from !== null && ram !== change.from)
     found.push(finding(FindingKind.Conflict, Weight.Asks, null, { from: change.from, found: ram }));

@@ -17,7 +17,6 @@ const PLAIN: EntryDoc = {
   writable: true,
   default: 500,
   node_id: false,
-  save_category: null,
   saved: true,
   group: "temperatures",
   section: "4.6",
@@ -33,7 +32,11 @@ const PLAIN: EntryDoc = {
   verify: "equal",
   requires: [],
   note: null,
+  save_category: null,
+  by_variant: {},
   inferred: false,
+  unproven: [],
+  origin: null,
   motion: false,
   also: [],
   hexadecimal: false,
@@ -54,8 +57,10 @@ const DOC: DescriptionDoc = {
     open: { exclusive: false, values: [{ value: 1, name: "one", text_key: "enum.open.one" }] },
   },
   errors: [],
-  save: [],
   entries: [],
+  save: [],
+  variant_matches: [],
+  sources: {},
 };
 
 const nothing: Lookup = () => null;

@@ -68,6 +68,10 @@ export function figure(number: number, decimals: number, language: Language): st
   return localise(number.toFixed(decimals), language);
 }
 
+/** A bit rate in kbit/s; a dash where the bus has none of its own, as Ethernet. */
+export const rateText = (bitrate: number, language: Language): string =>
+  bitrate > 0 ? figure(bitrate / 1000, 0, language) : "–";
+
 export function hexadecimal(entry: EntryDoc, raw: Raw): string {
   const bits = BigInt(Math.max(8, entry.bit_count ?? 8));
   const pattern = BigInt.asUintN(Number(bits), BigInt(raw));

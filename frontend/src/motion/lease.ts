@@ -69,6 +69,8 @@ export function useKeepLease(): void {
 export interface Looked {
   rotorLocked: boolean;
   peopleOut: boolean;
+  /** Devices whose stop by hand an expert answers for. */
+  externalStops: readonly string[];
 }
 
 const told = (line: MotionData) => liveStore.takeMotion(line);
@@ -94,7 +96,7 @@ export function useLeaseActions() {
     }),
     confirm: useMutation({
       mutationFn: (looked: Looked) =>
-        moving.confirm(holding.fence ?? 0, looked.rotorLocked, looked.peopleOut),
+        moving.confirm(holding.fence ?? 0, looked.rotorLocked, looked.peopleOut, looked.externalStops),
       onSuccess: told,
     }),
   };

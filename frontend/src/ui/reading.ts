@@ -7,6 +7,7 @@ import { useCell, useHearing, useLink, useNodes, useServerNow, useStore } from "
 import type { Cell, LiveStore } from "../live/store";
 import { type DeviceContext, type Shown, shownOf } from "../model/shown";
 import { figure } from "../model/values";
+import { asVariant, variantOf } from "../model/variant";
 import { useTexts } from "../texts/texts";
 
 const REFRESH_MS = 1000;
@@ -56,7 +57,16 @@ export function useDeviceContext(device: DeviceRef | undefined): DeviceContext |
   return useMemo(() => {
     if (!device || !doc) return null;
     const { slug, node } = device;
-    return { slug, node, doc, t, lookup: (address: string) => rawAt(store, slug, address) };
+    const lookup = (address: string) => rawAt(store, slug, address);
+    return {
+      slug,
+      node,
+      get doc() {
+        return asVariant(doc, variantOf(doc, lookup));
+      },
+      t,
+      lookup,
+    };
   }, [device, doc, store, t]);
 }
 

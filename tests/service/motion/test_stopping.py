@@ -13,6 +13,7 @@ import signal
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass, field
+from email.utils import parsedate_to_datetime
 from pathlib import Path
 from time import monotonic
 from typing import Any, Final
@@ -36,6 +37,17 @@ SPEED_DPS: Final = -4.0
 LOOK_S: Final = 0.002
 NO_MORE: Final = 0.02
 """Slower than this, as a share of the speed, is standing."""
+QUIET_S: Final = 2.0
+"""An axis that stood for so long does not move any more."""
+CLOCK: Final = """
+import os, time
+
+def moved(really, unit):
+    return lambda: really() + (3600 * unit if os.path.exists(os.environ["CLOCK_MOVED"]) else 0)
+
+time.time, time.time_ns = moved(time.time, 1), moved(time.time_ns, 1_000_000_000)
+"""
+"""Python runs it before anything else: the wall clock is an hour ahead as soon as the file is there."""
 URL: Final = f"/api/live/devices/{AXIS}/motion"
 
 
@@ -162,10 +174,11 @@ class Stage:
 
 
 @asynccontextmanager
-async def turning(served: Served, folder: Path) -> AsyncIterator[Stage]:
+async def turning(served: Served, folder: Path, **environment: str) -> AsyncIterator[Stage]:
     """An axis that a page holds in motion."""
     site = site_for(served.address, folder)
-    with running("serve", "--site", str(site), "--port", "0", "--data", str(folder / "data"), "--json") as process:
+    command = ("serve", "--site", str(site), "--port", "0", "--data", str(folder / "data"), "--json")
+    with running(*command, **environment) as process:
         url = json.loads(process.wait_for('"url"'))["url"]
         port = int(url.split(":")[2].split("/")[0])
         relay = Relay(port)
@@ -225,7 +238,7 @@ async def _start(stage: Stage) -> None:
     assert answer.status_code == 200, answer.text
     await page.hold(False)
     await page.hold(True)
-    stage.motion = asyncio.create_task(page.post(f"{URL}/jog", fence=page.fence, speed_dps=SPEED_DPS))
+    stage.motion = asyncio.create_task(page.post(f"{URL}/jog", fence=page.fence, speed=SPEED_DPS))
     pmc = stage.served.turbine.blades[0].pmc
     await _until(lambda: pmc.drive.velocity < 0.95 * SPEED_DPS * 100)
     stage.full = abs(pmc.drive.plant.speed_rad_s)
@@ -240,11 +253,26 @@ async def _until(holds: Callable[[], bool], timeout_s: float = 20.0) -> float:
 
 
 async def stopped(stage: Stage, what: str) -> None:
-    """The stop begins soon enough, and the axis comes to stand; the times are printed."""
+    """The stop begins soon enough, and the axis comes to stand for good; the times are printed."""
+    event_s = monotonic()
     begin_s = await _until(lambda: stage.speed < 0.9)
     stand_s = begin_s + await _until(lambda: stage.speed < NO_MORE)
-    print(f"STOP {what}: begins {1000 * begin_s:.0f} ms, stands {1000 * stand_s:.0f} ms")
+    last_s = await _rest(stage) - event_s
+    print(
+        f"STOP {what}: begins {1000 * begin_s:.0f} ms, stands {1000 * stand_s:.0f} ms, for good {1000 * last_s:.0f} ms"
+    )
     assert begin_s <= BEGIN_S
+
+
+async def _rest(stage: Stage) -> float:
+    """When it was last seen to move, by the monotonic clock: a fault may have all blades drive to feather."""
+    last_s = monotonic()
+    async with asyncio.timeout(60.0):
+        while monotonic() - last_s < QUIET_S:
+            if stage.speed >= NO_MORE:
+                last_s = monotonic()
+            await asyncio.sleep(LOOK_S)
+    return last_s
 
 
 async def test_the_tab_is_killed(served: Served, tmp_path: Path) -> None:
@@ -263,6 +291,27 @@ async def test_the_network_is_cut(served: Served, tmp_path: Path) -> None:
     async with turning(served, tmp_path) as stage:
         stage.relay.cut = True
         await stopped(stage, "network cut")
+
+
+async def test_the_wall_clock_is_set(served: Served, tmp_path: Path) -> None:
+    (tmp_path / "python").mkdir()
+    (tmp_path / "python" / "sitecustomize.py").write_text(CLOCK)
+    moved = tmp_path / "moved"
+    async with turning(served, tmp_path, PYTHONPATH=str(tmp_path / "python"), CLOCK_MOVED=str(moved)) as stage:
+        before_s = await _server_s(stage)
+        moved.touch()
+        async with asyncio.timeout(5.0):
+            while await _server_s(stage) - before_s < 3600:
+                assert stage.speed > 0.9, "who holds it is not disturbed"
+                await asyncio.sleep(0.1)
+        await stage.page.freeze()
+        await stopped(stage, "wall clock set, then the browser frozen")
+
+
+async def _server_s(stage: Stage) -> float:
+    """The wall clock of the server: its answers bear it."""
+    answer = await stage.page.client.get("/api/live/motion")
+    return parsedate_to_datetime(answer.headers["date"]).timestamp()
 
 
 async def test_the_button_is_let_go(served: Served, tmp_path: Path) -> None:
@@ -298,16 +347,16 @@ async def test_a_second_page_and_old_orders_do_nothing(served: Served, tmp_path:
         answer = await other.post("/api/live/motion/lease", page="other")
         assert (answer.status_code, answer.json()["code"]) == (409, "lease_held")
         for fence, order, code in ((held.fence - 1, 99, "lease"), (held.fence, held.order, "old_order")):
-            answer = await other.post(f"{URL}/jog", fence=fence, order=order, speed_dps=4.0)
+            answer = await other.post(f"{URL}/jog", fence=fence, order=order, speed=4.0)
             assert (answer.status_code, answer.json()["code"]) == (409, code)
         assert stage.speed > 0.9, "who holds it is not disturbed"
         await held.freeze()
         other.fence, other.number = held.fence, 10_000
         await other.hold(True)  # the number of the lease alone holds nothing: another page has it
         await stopped(stage, "browser frozen, another page beats")
-        answer = await held.post(f"{URL}/jog", fence=held.fence, order=held.order, speed_dps=SPEED_DPS)
+        answer = await held.post(f"{URL}/jog", fence=held.fence, order=held.order, speed=SPEED_DPS)
         assert answer.json()["code"] == "old_order"
-        answer = await held.post(f"{URL}/jog", fence=held.fence, speed_dps=SPEED_DPS)
+        answer = await held.post(f"{URL}/jog", fence=held.fence, speed=SPEED_DPS)
         assert answer.json()["code"] == "not_held"
         await asyncio.sleep(0.3)
         assert stage.speed < NO_MORE
@@ -319,7 +368,7 @@ async def test_nothing_moves_without_a_lease(served: Served, tmp_path: Path) -> 
         answer = await page.post("/api/live/motion/lease/give-back", fence=page.fence)
         assert answer.status_code == 200
         await stopped(stage, "lease given back")
-        answer = await page.post(f"{URL}/jog", fence=page.fence, speed_dps=SPEED_DPS)
+        answer = await page.post(f"{URL}/jog", fence=page.fence, speed=SPEED_DPS)
         assert (answer.status_code, answer.json()["code"]) == (409, "lease_needed")
         await asyncio.sleep(0.3)
         assert stage.speed < NO_MORE

@@ -3,9 +3,14 @@ import { usePageSearch } from "../../frame/search";
 import { useAxes, useServerNow, useWatchDevice } from "../../live/live";
 import { figure } from "../../model/values";
 import { useTexts } from "../../texts/texts";
-import { useDeviceContext } from "../../ui/reading";
+import { entriesOf, useDeviceContext, useReading } from "../../ui/reading";
+import { measuresOf, useAxisNow } from "../../motion/axis";
+import { severityOf } from "../../model/axisState";
+import type { DeviceContext } from "../../model/shown";
+import { errorIn } from "./errorMemory";
+import { Routing } from "./Routing";
 import { age } from "../../ui/format";
-import { PMC, PMM } from "../overview/layout";
+import { PMM } from "../overview/layout";
 import classes from "./Axis.module.css";
 import { BladeStrip } from "./BladeStrip";
 import { BitPanel } from "./BitPanel";
@@ -20,8 +25,8 @@ import { StateDiagram } from "./StateDiagram";
 export function AxisPage() {
   return (
     <div className={classes.page}>
-      <BladeStrip now={(station) => <Now station={station} />}>
-        {(station) => <Blade key={station.slug} station={station} />}
+      <BladeStrip now={(station) => <Now station={station} />} benches>
+        {(station) => <Axis key={station.slug} station={station} />}
       </BladeStrip>
     </div>
   );
@@ -30,17 +35,27 @@ export function AxisPage() {
 function Now({ station }: { station: StationRef }) {
   const t = useTexts();
   const axis = useAxes().get(station.blade ?? 0);
-  const stale = axis?.stale ?? true;
+  const context = useDeviceContext(axisOf(station));
+  const { position, state, stale, ageMs } = useAxisNow(station, context);
+  const { unit, decimals } = measuresOf(context).position;
+  const ofBlade = station.blade !== null;
+  const suffix = ofBlade || unit === "°" ? "°" : ` ${unit}`;
   return (
     <div className={`${classes.now} bench`} data-stale={stale}>
       <strong data-testid="axis-angle">
-        {axis?.position_deg == null ? "–" : `${figure(axis.position_deg, 2, t.language)}°`}
+        {position === null ? "–" : `${figure(position, ofBlade ? 2 : decimals, t.language)}${suffix}`}
       </strong>
-      <span data-testid="axis-state">{axis?.state == null ? "–" : t(axis.state)}</span>
+      <span data-testid="axis-state">{state === null ? "–" : t(state)}</span>
       {stale && axis?.position_t_ns != null && <Age axis={axis} />}
+      {stale && ageMs !== null && (
+        <span className="tone-warning">{t("page.stale", { age: age(ageMs, t.language) })}</span>
+      )}
     </div>
   );
 }
+
+/** The device with the controlword; at a station with several the first. */
+const axisOf = (station: StationRef) => station.devices.find((device) => device.axis);
 
 function Age({ axis }: { axis: AxisData }) {
   const t = useTexts();
@@ -49,44 +64,51 @@ function Age({ axis }: { axis: AxisData }) {
   return <span className="tone-warning">{t("page.stale", { age: age(ageMs, t.language) })}</span>;
 }
 
-function Blade({ station }: { station: StationRef }) {
+function Axis({ station }: { station: StationRef }) {
   const t = useTexts();
   const pmm = station.devices.find((device) => device.description_id === PMM);
-  const pmc = station.devices.find((device) => device.description_id === PMC);
+  const drive = axisOf(station);
   useWatchDevice(pmm?.slug ?? null);
-  useWatchDevice(pmc?.slug ?? null);
-  const contexts = { pmm: useDeviceContext(pmm), pmc: useDeviceContext(pmc) };
-  const axis = useAxes().get(station.blade ?? 0);
+  useWatchDevice(drive?.slug ?? null);
+  const contexts = { pmm: useDeviceContext(pmm), pmc: useDeviceContext(drive) };
+  const now = useAxisNow(station, contexts.pmc);
+  const blade = useAxes().get(station.blade ?? 0);
+  const faults = useFaults(contexts.pmc, blade?.faults);
   const [{ replay }] = usePageSearch();
+  const name = drive?.name.toUpperCase() ?? "";
   return (
     <div className={`${classes.panels} bench`}>
       {replay !== undefined ? (
         <RecordedNote part="motion" />
       ) : (
-        pmc && <MotionPanel device={pmc} context={contexts.pmc} />
+        drive && <MotionPanel station={station} device={drive} context={contexts.pmc} />
       )}
       <section className={`${classes.panel} ${classes.plots}`} aria-label={t("page.axis.machine")}>
         <h2>{t("page.axis.machine")}</h2>
-        <StateDiagram state={axis?.state ?? null} stale={axis?.stale ?? true} />
+        <StateDiagram state={now.state} stale={now.stale} />
       </section>
-      <section className={`${classes.panel} ${classes.plots}`} aria-label={t("page.axis.plots")}>
-        <Plots blade={station.blade ?? 0} />
-      </section>
+      {station.blade !== null && (
+        <section className={`${classes.panel} ${classes.plots}`} aria-label={t("page.axis.plots")}>
+          <Plots blade={station.blade} />
+        </section>
+      )}
       <Measurements {...contexts} />
       <BitPanel title={t("page.axis.statusword")} context={contexts.pmc} address="6041" pace="fast" />
       <BitPanel title={t("page.axis.controlword")} context={contexts.pmc} address="6040" pace="rare" />
       <BitPanel
-        title={t("page.axis.inputs", { device: "PMC" })}
+        title={t("page.axis.inputs", { device: name })}
         context={contexts.pmc}
         address="60FD"
         pace="slow"
       />
+      {/* What the outputs are, where the drive tells it; else what they are told to be. */}
       <BitPanel
-        title={t("page.axis.outputs", { device: "PMC" })}
+        title={t("page.axis.outputs", { device: name })}
         context={contexts.pmc}
-        address="60FE:03"
+        address={contexts.pmc && !entriesOf(contexts.pmc.doc).has("60FE:03") ? "60FE:01" : "60FE:03"}
         pace="slow"
       />
+      <Routing context={contexts.pmc} />
       <BitPanel
         title={t("page.axis.inputs", { device: "PMM" })}
         context={contexts.pmm}
@@ -99,8 +121,22 @@ function Blade({ station }: { station: StationRef }) {
         address="30FE:03"
         pace="slow"
       />
-      <ErrorHistory device={pmc} context={contexts.pmc} partner={contexts.pmm} faults={axis?.faults ?? []} />
-      <ErrorHistory device={pmm} context={contexts.pmm} partner={contexts.pmc} faults={axis?.faults ?? []} />
+      <ErrorHistory device={drive} context={contexts.pmc} partner={contexts.pmm} faults={faults} />
+      <ErrorHistory device={pmm} context={contexts.pmm} partner={contexts.pmc} faults={faults} />
     </div>
   );
+}
+
+/** Those of a blade come with it; of another axis its error code and its statusword tell. */
+function useFaults(
+  context: DeviceContext | null,
+  ofBlade: AxisData["faults"] | undefined,
+): AxisData["faults"] {
+  const reading = useReading(context, "603F", "slow");
+  const status = useReading(context, "6041", "fast");
+  if (ofBlade !== undefined || context === null) return ofBlade ?? [];
+  const code = reading?.raw;
+  if (typeof code !== "number" || code === 0) return [];
+  const severity = severityOf(typeof status?.raw === "number" ? status.raw : null);
+  return [{ device: context.slug, code, text_key: errorIn(context.doc, code)?.text_key ?? null, severity }];
 }

@@ -17,6 +17,8 @@ interface Props {
 export function BitPanel({ title, context, address, pace }: Props) {
   const reading = useReading(context, address, pace);
   const entry = context ? entriesOf(context.doc).get(address) : undefined;
+  // A device that has no such object has no such card.
+  if (context && !entry) return null;
   const table = entry?.bits ? (context?.doc.bit_tables[entry.bits] ?? []) : [];
   return (
     <section className={classes.panel} aria-label={title} data-testid={`bits-${address}`}>

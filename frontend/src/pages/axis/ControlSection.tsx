@@ -1,5 +1,7 @@
 import { Button, Checkbox } from "@mantine/core";
+import { useQuery } from "@tanstack/react-query";
 import { useState } from "react";
+import { type Interlock, interlocksQuery } from "../../api/motion";
 import { NeedsRole } from "../../frame/NeedsRole";
 import { useServerNow } from "../../live/live";
 import { Control, type Looked, useControl, useLeaseActions } from "../../motion/lease";
@@ -10,7 +12,7 @@ import { ProblemAlert } from "../../ui/ProblemAlert";
 const SECOND_MS = 1000;
 
 /** Who may move the axes: take it, ask for it, hand it over; and what a person has to look at. */
-export function ControlSection() {
+export function ControlSection({ device }: { device: string }) {
   const t = useTexts();
   const { state } = useControl();
   const actions = useLeaseActions();
@@ -18,7 +20,7 @@ export function ControlSection() {
   return (
     <section aria-label={t("page.motion.control")}>
       <h3>{t("page.motion.control")}</h3>
-      {state === Control.Own ? <Own actions={actions} /> : <NotOwn actions={actions} />}
+      {state === Control.Own ? <Own actions={actions} device={device} /> : <NotOwn actions={actions} />}
       {error != null && <ProblemAlert error={error} title={t("page.motion.control_failed")} />}
     </section>
   );
@@ -59,13 +61,20 @@ function NotOwn({ actions }: { actions: Actions }) {
   );
 }
 
-function Own({ actions }: { actions: Actions }) {
+function Own({ actions, device }: { actions: Actions; device: string }) {
   const t = useTexts();
   const { motion: line } = useControl();
+  const { data } = useQuery(interlocksQuery(device));
   // Shown at once; nobody else can confirm while this page has control, and with another lease this begins anew.
   const [mine, setMine] = useState<Looked | null>(null);
   if (!line) return null;
-  const looked = mine ?? { rotorLocked: line.rotor_locked, peopleOut: line.people_out };
+  const looked = mine ?? {
+    rotorLocked: line.rotor_locked,
+    peopleOut: line.people_out,
+    externalStops: line.external_stops,
+  };
+  const asks = (name: string) => data?.some((one) => one.name === name) ?? false;
+  const stop = stopOf(data);
   const confirm = (one: Looked) => {
     setMine(one);
     actions.confirm.mutate(one, { onError: () => setMine(null) });
@@ -73,20 +82,46 @@ function Own({ actions }: { actions: Actions }) {
   return (
     <>
       <Asked actions={actions} />
-      <Checkbox
-        checked={looked.rotorLocked}
-        onChange={(event) => confirm({ ...looked, rotorLocked: event.currentTarget.checked })}
-        label={t("page.motion.rotor_locked")}
-        data-testid="rotor-locked"
-        my={6}
-      />
-      <Checkbox
-        checked={looked.peopleOut}
-        onChange={(event) => confirm({ ...looked, peopleOut: event.currentTarget.checked })}
-        label={t("page.motion.people_out")}
-        data-testid="people-out"
-        my={6}
-      />
+      {/* What is to be confirmed is what holds this axis back. */}
+      {asks("rotor_locked") && (
+        <Checkbox
+          checked={looked.rotorLocked}
+          onChange={(event) => confirm({ ...looked, rotorLocked: event.currentTarget.checked })}
+          label={t("page.motion.rotor_locked")}
+          data-testid="rotor-locked"
+          my={6}
+        />
+      )}
+      {(asks("people_out") || asks("zone_clear")) && (
+        <Checkbox
+          checked={looked.peopleOut}
+          onChange={(event) => confirm({ ...looked, peopleOut: event.currentTarget.checked })}
+          label={t(asks("zone_clear") ? "page.motion.zone_clear" : "page.motion.people_out")}
+          data-testid="people-out"
+          my={6}
+        />
+      )}
+      {stop !== null && (
+        <NeedsRole role="expert" device>
+          {(locked) => (
+            <Checkbox
+              checked={looked.externalStops.includes(device)}
+              disabled={locked}
+              onChange={(event) => {
+                const others = looked.externalStops.filter((one) => one !== device);
+                confirm({
+                  ...looked,
+                  externalStops: event.currentTarget.checked ? [...others, device] : others,
+                });
+              }}
+              label={t("page.motion.external_stop", { stop })}
+              description={locked ? t("page.motion.external_stop_role") : undefined}
+              data-testid="external-stop"
+              my={6}
+            />
+          )}
+        </NeedsRole>
+      )}
       <div className={motion.row}>
         <Button variant="default" onClick={() => actions.giveBack.mutate()} data-testid="give-back">
           {t("page.motion.give_back")}
@@ -94,6 +129,14 @@ function Own({ actions }: { actions: Actions }) {
       </div>
     </>
   );
+}
+
+const ANSWERED_FOR = ["interlock.external_stop.confirmed", "interlock.external_stop.not_confirmed"];
+
+/** The stop by hand that the site file names for the drive; null where none has to be answered for. */
+function stopOf(interlocks: readonly Interlock[] | undefined): string | null {
+  const details = interlocks?.find((one) => one.name === "self_stop")?.details;
+  return details && ANSWERED_FOR.includes(String(details.state_key)) ? String(details.stop) : null;
 }
 
 /** Somebody else wants it: without an answer it is theirs after a while. */

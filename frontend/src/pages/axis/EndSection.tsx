@@ -9,7 +9,7 @@ import { useOrder } from "../../motion/useOrder";
 import { useTexts } from "../../texts/texts";
 
 /** What ends the motion of this one axis, whoever moves it, and what takes its fault away. */
-export function EndSection({ device }: { device: string }) {
+export function EndSection({ device, title }: { device: string; title: string }) {
   const t = useTexts();
   const { motion: line, state } = useControl();
   const reset = useOrder();
@@ -17,8 +17,8 @@ export function EndSection({ device }: { device: string }) {
   const stop = useMutation({ mutationFn: () => commands.stopOne(device) });
   const own = state === Control.Own;
   return (
-    <section aria-label={t("page.motion.end")}>
-      <h3>{t("page.motion.end")}</h3>
+    <section aria-label={title}>
+      <h3>{title}</h3>
       <div className={motion.row}>
         <Button color="red" onClick={() => stop.mutate()} data-testid="quick-stop">
           {t("page.motion.quick_stop")}

@@ -16,7 +16,7 @@ import classes from "./Axis.module.css";
 import { ErrorAid, FAULT_REACTION } from "./ErrorAid";
 import { ErrorNow } from "./ErrorNow";
 import own from "./Errors.module.css";
-import { errorIn, MEMORY, type MemoryEntry, memoryOf } from "./errorMemory";
+import { errorIn, MEMORY, STAMP, type MemoryEntry, memoryOf } from "./errorMemory";
 
 interface Props {
   device: DeviceRef | undefined;
@@ -48,7 +48,7 @@ export function ErrorHistory({ device, context, partner, faults }: Props) {
   const fault = faults.find((one) => one.device === slug);
   const title = t("page.axis.history", { device: device.name });
   // What the drive would do belongs to what the memory tells.
-  const wanted = entriesOf(context.doc).has(FAULT_REACTION) ? [...MEMORY, FAULT_REACTION] : [...MEMORY];
+  const wanted = [...MEMORY, FAULT_REACTION].filter((address) => entriesOf(context.doc).has(address));
   return (
     <section
       className={`${classes.panel} ${classes.wide}`}
@@ -102,6 +102,7 @@ interface EntriesProps {
 
 function Entries({ entries, context, partner, now }: EntriesProps) {
   const t = useTexts();
+  const stamped = entriesOf(context.doc).has(STAMP);
   const [chosen, setChosen] = useState<Record<string, boolean>>({});
   // The newest is open by itself, but nothing is told twice.
   const isOpen = ({ key, at, code }: MemoryEntry) => chosen[key] ?? (at === 1 && code !== now);
@@ -112,7 +113,7 @@ function Entries({ entries, context, partner, now }: EntriesProps) {
           <th>{t("page.axis.code")}</th>
           <th>{t("page.axis.meaning")}</th>
           <th>{t("page.axis.reaction")}</th>
-          <th title={t("page.axis.stamp_title")}>{t("page.axis.stamp")}</th>
+          {stamped && <th title={t("page.axis.stamp_title")}>{t("page.axis.stamp")}</th>}
         </tr>
       </thead>
       {entries.map((entry) => (
@@ -122,6 +123,7 @@ function Entries({ entries, context, partner, now }: EntriesProps) {
           context={context}
           partner={partner}
           open={isOpen(entry)}
+          stamped={stamped}
           onToggle={() => setChosen({ ...chosen, [entry.key]: !isOpen(entry) })}
         />
       ))}
@@ -134,10 +136,11 @@ interface EntryProps {
   context: DeviceContext;
   partner: DeviceContext | null;
   open: boolean;
+  stamped: boolean;
   onToggle: () => void;
 }
 
-function EntryRows({ entry, context, partner, open, onToggle }: EntryProps) {
+function EntryRows({ entry, context, partner, open, stamped, onToggle }: EntryProps) {
   const t = useTexts();
   const id = useId();
   const { code, raw, at } = entry;
@@ -166,11 +169,11 @@ function EntryRows({ entry, context, partner, open, onToggle }: EntryProps) {
         </td>
         <td>{code === null ? t("page.axis.entry_unread") : meaningOf(context.doc, code, t)}</td>
         <td>{code === null ? "–" : reactionOf(context.doc, code, t)}</td>
-        <td>{entry.stamp ?? "–"}</td>
+        {stamped && <td>{entry.stamp ?? "–"}</td>}
       </tr>
       {shown && (
         <tr id={id} className={own.more}>
-          <td colSpan={4}>
+          <td colSpan={stamped ? 4 : 3}>
             <ErrorAid code={code} context={context} partner={partner} />
           </td>
         </tr>

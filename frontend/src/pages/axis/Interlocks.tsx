@@ -5,12 +5,12 @@ import motion from "../../motion/Motion.module.css";
 import { useTexts } from "../../texts/texts";
 
 /** What holds the axis back, each with its reason, before it bites. */
-export function Interlocks({ device }: { device: string }) {
+export function Interlocks({ device, title }: { device: string; title: string }) {
   const t = useTexts();
   const { data } = useQuery(interlocksQuery(device));
   return (
-    <section aria-label={t("page.motion.interlocks")}>
-      <h3>{t("page.motion.interlocks")}</h3>
+    <section aria-label={title}>
+      <h3>{title}</h3>
       <ul className={motion.locks} data-testid="interlocks">
         {(data ?? []).map(({ name, holds_back: bites, details }) => (
           <li key={name} data-bites={bites} data-testid={`interlock-${name}`}>

@@ -1,5 +1,9 @@
+import { Alert } from "@mantine/core";
+import { IconPlugConnectedX } from "@tabler/icons-react";
 import { useTexts } from "../../texts/texts";
-import type { DeviceRef } from "../../api/types";
+import { entriesOf } from "../../ui/reading";
+import { searches, useUnwatched } from "../../motion/axis";
+import type { DeviceRef, StationRef } from "../../api/types";
 import type { DeviceContext } from "../../model/shown";
 import { Control, useControl } from "../../motion/lease";
 import motion from "../../motion/Motion.module.css";
@@ -11,33 +15,59 @@ import { Interlocks } from "./Interlocks";
 import { MoveSection } from "./MoveSection";
 import { PrepareSection } from "./PrepareSection";
 import { TrySection } from "./TrySection";
+import { SearchHomeSection } from "./SearchHomeSection";
 import { ProbeSection } from "./ProbeSection";
 import { SignalSection } from "./SignalSection";
 
+/** Test signals are judged by it. */
+const POSITION_GAIN = "60FB:01";
+const PROBE = "60BA";
+
+interface Props {
+  station: StationRef;
+  device: DeviceRef;
+  context: DeviceContext | null;
+}
+
 /** Moving the blade from here: control, what holds it back, the proof that it stops, then hold to run. */
-export function MotionPanel({ device, context }: { device: DeviceRef; context: DeviceContext | null }) {
+export function MotionPanel({ station, device, context }: Props) {
   const t = useTexts();
-  const { state } = useControl();
+  const { state, motion: line } = useControl();
+  const unwatched = useUnwatched(device.slug);
   if (state === Control.None) return null;
+  const blade = station.blade !== null;
+  const has = (address: string) => context !== null && entriesOf(context.doc).has(address);
+  // Words of a blade for what turns one.
+  const words = (key: string) => t(blade ? `page.motion.${key}` : `page.motion.axis_${key}`);
+  const lost = unwatched && line?.ended?.device === device.slug && line.ended.why === "link";
   return (
-    <section
-      className={`${classes.panel} ${classes.wide}`}
-      aria-label={t("page.motion.title")}
-      data-testid="motion"
-    >
-      <h2>{t("page.motion.title")}</h2>
+    <section className={`${classes.panel} ${classes.wide}`} aria-label={words("title")} data-testid="motion">
+      <h2>{words("title")}</h2>
+      {lost && (
+        <Alert color="red" icon={<IconPlugConnectedX aria-hidden />} role="alert" data-testid="link-unknown">
+          {t("page.motion.link_unknown")}
+        </Alert>
+      )}
       <div className={motion.panel}>
-        <ControlSection />
-        <Interlocks device={device.slug} />
+        <ControlSection device={device.slug} />
+        <Interlocks device={device.slug} title={words("interlocks")} />
         <PrepareSection device={device.slug} />
-        <MoveSection device={device.slug} context={context} />
+        <MoveSection station={station} device={device.slug} context={context} />
         <TrySection device={device.slug} context={context} />
-        <HomeSection device={device.slug} />
-        <EndSection device={device.slug} />
-        <SignalSection device={device.slug} />
-        <ProbeSection device={device.slug} />
+        {searches(context) ? (
+          <SearchHomeSection device={device.slug} context={context} />
+        ) : (
+          <HomeSection device={device.slug} />
+        )}
+        <EndSection device={device.slug} title={words("end")} />
+        {has(POSITION_GAIN) ? (
+          <SignalSection device={device.slug} />
+        ) : (
+          context && <p className="dim">{t("page.motion.no_signals")}</p>
+        )}
+        {has(PROBE) && <ProbeSection device={device.slug} />}
       </div>
-      <p className={motion.plain}>{t("page.motion.no_safety")}</p>
+      <p className={motion.plain}>{words("no_safety")}</p>
     </section>
   );
 }

@@ -1,7 +1,10 @@
 import { NumberInput } from "@mantine/core";
 import { useState } from "react";
 import { moving, type Order } from "../../api/motion";
-import { useAxes } from "../../live/live";
+import type { StationRef } from "../../api/types";
+import { useDeviceVersion } from "../../live/live";
+import { measuresOf, useAxisNow, useUnwatched } from "../../motion/axis";
+import { scaledAt } from "../../motion/drive";
 import { Control, useControl } from "../../motion/lease";
 import motion from "../../motion/Motion.module.css";
 import { OrderProblem } from "../../motion/OrderProblem";
@@ -13,9 +16,14 @@ import { useTexts } from "../../texts/texts";
 import { typedNumber } from "../../ui/typedNumber";
 import { Preview } from "./Preview";
 
-/** The fastest by hand; the server refuses more. */
+/** The fastest by hand at a blade; the server refuses more. */
 const MOST_DPS = 5;
 const USUAL_DPS = 2;
+const USUAL_DEG = 85;
+/** Elsewhere what the drive itself holds bounds the speed, and a tenth of its usual one is begun with. */
+const BOUNDS = ["607F", "6080"];
+const PROFILE_SPEED = "6081";
+const OF_PROFILE = 10;
 
 enum Way {
   Minus = "minus",
@@ -23,14 +31,35 @@ enum Way {
   To = "to",
 }
 
-/** Hold to run: jog to either side, or move to an angle, with what will come of it. */
-export function MoveSection({ device, context }: { device: string; context: DeviceContext | null }) {
+interface Props {
+  station: StationRef;
+  device: string;
+  context: DeviceContext | null;
+}
+
+function mostOf(context: DeviceContext | null): number | undefined {
+  const bounds = BOUNDS.flatMap((address) => (context ? (scaledAt(context, address) ?? []) : []));
+  const set = bounds.filter((bound) => bound > 0);
+  return set.length === 0 ? undefined : Math.min(...set);
+}
+
+/** Hold to run: jog to either side, or move to a position, with what will come of it. */
+export function MoveSection({ station, device, context }: Props) {
   const t = useTexts();
   const { motion: line, state } = useControl();
   const order = useOrder();
-  const [speed, setSpeed] = useState(USUAL_DPS);
-  const [angle, setAngle] = useState(85);
-  const axis = [...useAxes().values()].find((one) => device.startsWith(one.station));
+  const blade = station.blade !== null;
+  useDeviceVersion(device);
+  const [typedSpeed, setSpeed] = useState<number | null>(null);
+  const [angle, setAngle] = useState(blade ? USUAL_DEG : 0);
+  const now = useAxisNow(station, context);
+  const measures = measuresOf(context);
+  const most = blade ? MOST_DPS : mostOf(context);
+  const profile = context && scaledAt(context, PROFILE_SPEED);
+  const usual = blade ? USUAL_DPS : profile ? Math.max(1, Math.round(profile / OF_PROFILE)) : 1;
+  const speed = typedSpeed ?? usual;
+  const degrees = measures.position.unit === "°";
+  const suffix = degrees ? "°" : ` ${measures.position.unit}`;
   const ready = state === Control.Own && line?.prepared.some((one) => one.device === device) === true;
   const busy = order.isPending || line?.running != null;
   const doing = line?.running?.device === device ? line.running.doing : null;
@@ -39,6 +68,10 @@ export function MoveSection({ device, context }: { device: string; context: Devi
     setPressed(way);
     order.mutate({ held: true, work });
   };
+  // What a drive does alone that cannot watch us, nobody knows.
+  const unwatched = useUnwatched(device);
+  const ended = (why: string) =>
+    unwatched && why === "link" ? "page.motion.link_unknown_short" : `motion.ended.${why}`;
   const active = (way: Way) => doing !== null && pressed === way;
   return (
     <section aria-label={t("page.motion.move")}>
@@ -49,29 +82,29 @@ export function MoveSection({ device, context }: { device: string; context: Devi
           value={speed}
           onChange={(value) => typedNumber(value, setSpeed)}
           min={0.1}
-          max={MOST_DPS}
+          {...(most === undefined ? {} : { max: most })}
           allowNegative={false}
           clampBehavior="strict"
-          step={0.5}
-          decimalScale={2}
-          suffix=" °/s"
+          step={blade ? 0.5 : 10}
+          decimalScale={measures.speed.decimals}
+          suffix={` ${measures.speed.unit}`}
           w={130}
           data-testid="speed"
         />
         <NumberInput
-          label={t("page.motion.angle")}
+          label={t(degrees ? "page.motion.angle" : "page.motion.position")}
           value={angle}
           onChange={(value) => typedNumber(value, setAngle)}
           step={1}
-          decimalScale={2}
-          suffix="°"
+          decimalScale={measures.position.decimals}
+          suffix={suffix}
           w={130}
           data-testid="angle"
         />
       </div>
       <div className={`${motion.row} ${motion.runs}`}>
         <RunButton
-          hint={t("page.motion.to_zero")}
+          hint={t(blade ? "page.motion.to_zero" : "page.motion.negative")}
           disabled={!ready || busy}
           active={active(Way.Minus)}
           onPress={() => hold(Way.Minus, (one) => moving.jog(device, one, -Math.abs(speed)))}
@@ -80,7 +113,7 @@ export function MoveSection({ device, context }: { device: string; context: Devi
           ◀ {t("page.motion.jog")}
         </RunButton>
         <RunButton
-          hint={t("page.motion.to_feather")}
+          hint={t(blade ? "page.motion.to_feather" : "page.motion.positive")}
           disabled={!ready || busy}
           active={active(Way.Plus)}
           onPress={() => hold(Way.Plus, (one) => moving.jog(device, one, Math.abs(speed)))}
@@ -95,18 +128,20 @@ export function MoveSection({ device, context }: { device: string; context: Devi
           onPress={() => hold(Way.To, (one) => moving.move(device, one, angle, speed))}
           testId="move-to"
         >
-          {t("page.motion.move_to", { angle: figure(angle, 2, t.language) })}
+          {t("page.motion.move_to_position", {
+            position: `${figure(angle, measures.position.decimals, t.language)}${suffix}`,
+          })}
         </RunButton>
       </div>
       <div className={motion.row}>
         <span className={motion.ended} data-testid="motion-ended">
           {line?.ended?.device === device &&
             doing === null &&
-            `${t(`motion.doing.${line.ended.doing}`)}: ${t(`motion.ended.${line.ended.why}`)}`}
+            `${t(`motion.doing.${line.ended.doing}`)}: ${t(ended(line.ended.why))}`}
         </span>
       </div>
-      {context && axis?.position_deg != null && (
-        <Preview context={context} fromDeg={axis.position_deg} toDeg={angle} speedDps={speed} />
+      {context && now.position !== null && (
+        <Preview context={context} from={now.position} to={angle} speed={speed} />
       )}
       <OrderProblem error={order.error} title={t("page.motion.order_failed")} />
     </section>

@@ -1,6 +1,7 @@
 import { Button } from "@mantine/core";
 import { moving } from "../../api/motion";
 import { Control, useControl } from "../../motion/lease";
+import { useUnwatched } from "../../motion/axis";
 import motion from "../../motion/Motion.module.css";
 import { OrderProblem } from "../../motion/OrderProblem";
 import { RunButton } from "../../motion/RunButton";
@@ -14,12 +15,22 @@ export function PrepareSection({ device }: { device: string }) {
   const order = useOrder();
   const prepared = line?.prepared.find((one) => one.device === device);
   const left = line?.left.includes(device) === true;
+  const unwatched = useUnwatched(device);
+  const title = t(unwatched ? "page.motion.unwatched" : "page.motion.preparation");
   const running = line?.running?.device === device ? line.running.doing : null;
   return (
-    <section aria-label={t("page.motion.preparation")}>
-      <h3>{t("page.motion.preparation")}</h3>
+    <section aria-label={title}>
+      <h3>{title}</h3>
       {left && <p className="tone-warning">{t("page.motion.left")}</p>}
-      <p>{prepared ? t("page.motion.proven", { ms: prepared.proof_ms }) : t("page.motion.not_proven")}</p>
+      {unwatched ? (
+        <p className={prepared ? "tone-warning" : undefined}>
+          {t(prepared ? "page.motion.unwatched_ready" : "page.motion.unwatched_not_yet")}
+        </p>
+      ) : (
+        <p>
+          {prepared ? t("page.motion.proven", { ms: prepared.proof_ms ?? "–" }) : t("page.motion.not_proven")}
+        </p>
+      )}
       <div className={motion.row}>
         {prepared || left ? (
           <Button
@@ -45,7 +56,11 @@ export function PrepareSection({ device }: { device: string }) {
       </div>
       {/* Below the button: it must not move away under the finger that holds it. */}
       <p data-testid="proof">
-        {prepared ? t("page.motion.is_proven") : running === "preparing" ? t("page.motion.proving") : ""}
+        {prepared
+          ? t(unwatched ? "page.motion.unwatched_short" : "page.motion.is_proven")
+          : running === "preparing"
+            ? t("page.motion.proving")
+            : ""}
       </p>
       <OrderProblem error={order.error} title={t("page.motion.prepare_failed")} />
     </section>

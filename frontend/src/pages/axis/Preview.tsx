@@ -1,6 +1,7 @@
 import { useDeviceVersion } from "../../live/live";
 import type { DeviceContext } from "../../model/shown";
 import { figure } from "../../model/values";
+import { measuresOf, wayPerS } from "../../motion/axis";
 import { boundsOf } from "../../motion/drive";
 import motion from "../../motion/Motion.module.css";
 import { type Profile, profileOf, shareAt } from "../../motion/profile";
@@ -8,9 +9,10 @@ import { useTexts } from "../../texts/texts";
 
 interface Props {
   context: DeviceContext;
-  fromDeg: number;
-  toDeg: number;
-  speedDps: number;
+  /** In the units of the axis. */
+  from: number;
+  to: number;
+  speed: number;
 }
 
 const WIDTH = 260;
@@ -18,40 +20,51 @@ const HEIGHT = 64;
 const POINTS = 60;
 
 /** What will come of a move, by the ramps and limits that the drive holds now. */
-export function Preview({ context, fromDeg, toDeg, speedDps }: Props) {
+export function Preview({ context, from, to, speed }: Props) {
   const t = useTexts();
   useDeviceVersion(context.slug);
-  const bounds = boundsOf(context, speedDps);
-  const { lowestDeg: lowest, highestDeg: highest, ramps } = bounds;
-  const profile = profileOf(toDeg - fromDeg, ramps);
+  const bounds = boundsOf(context, speed);
+  const { lowest, highest, ramps } = bounds;
+  const measures = measuresOf(context);
+  const perS = wayPerS(measures.position.unit, measures.speed.unit);
+  // The way is told in units of position, speeds in units of speed: what both have in common is a factor.
+  const profile = perS === null ? null : profileOf((to - from) / perS, ramps);
   const seconds = (s: number) => figure(s, 1, t.language);
-  const degrees = (deg: number) => figure(deg, 2, t.language);
-  const beyond = (lowest !== null && toDeg < lowest) || (highest !== null && toDeg > highest);
+  const place = (number: number) => figure(number, measures.position.decimals, t.language);
+  const pace = (number: number) => figure(number, measures.speed.decimals, t.language);
+  const beyond = (lowest !== null && to < lowest) || (highest !== null && to > highest);
   return (
     <div className={motion.preview} data-testid="preview" data-beyond={beyond}>
-      {profile && <Curve profile={profile} falling={toDeg < fromDeg} />}
+      {profile && <Curve profile={profile} falling={to < from} />}
       <p>
         {profile === null
           ? t("page.motion.preview_unknown")
-          : t("page.motion.preview", {
+          : t("page.motion.preview_axis", {
               total: seconds(profile.totalS),
               up: seconds(profile.upS),
               steady: seconds(profile.steadyS),
               down: seconds(profile.downS),
-              peak: degrees(profile.peakDps),
+              peak: pace(profile.peakDps),
+              unit: measures.speed.unit,
             })}
       </p>
       {lowest !== null && highest !== null && (
         <p className={beyond ? "tone-error" : "dim"}>
-          {t(beyond ? "page.motion.preview_beyond" : "page.motion.preview_within", {
-            low: degrees(lowest),
-            high: degrees(highest),
+          {t(beyond ? "page.motion.preview_axis_beyond" : "page.motion.preview_axis_within", {
+            low: place(lowest),
+            high: place(highest),
+            unit: measures.position.unit,
           })}
         </p>
       )}
+      {bounds.unlimited && <p className="dim">{t("page.motion.preview_no_limits")}</p>}
       {bounds.bounded !== null && (
         <p className="tone-warning">
-          {t("page.motion.preview_bounded", { speed: degrees(ramps.speedDps), object: `${bounds.bounded}h` })}
+          {t("page.motion.preview_axis_bounded", {
+            speed: pace(ramps.speedDps),
+            unit: measures.speed.unit,
+            object: `${bounds.bounded}h`,
+          })}
         </p>
       )}
     </div>

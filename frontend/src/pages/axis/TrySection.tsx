@@ -10,8 +10,13 @@ import { OrderProblem } from "../../motion/OrderProblem";
 import { RunButton } from "../../motion/RunButton";
 import { useOrder } from "../../motion/useOrder";
 import { useTexts } from "../../texts/texts";
+import { entriesOf } from "../../ui/reading";
+import { bitState } from "../overview/layout";
 
 const FEATHER_TARGET = "567A";
+/** By its bit the test of the brake sees whether it is lifted. */
+const OUTPUTS = "60FE:03";
+const BRAKE = "brake";
 /** A blade that stands so near at its target has not been driven. */
 const AT_TARGET_DEG = 0.5;
 
@@ -26,6 +31,8 @@ export function TrySection({ device, context }: { device: string; context: Devic
   const ready = state === Control.Own && line?.prepared.some((one) => one.device === device) === true;
   const disabled = !ready || order.isPending || line.running !== null;
   const doing = line?.running?.device === device ? line.running.doing : null;
+  const feathers = context !== null && entriesOf(context.doc).has(FEATHER_TARGET);
+  const hasBrake = context !== null && bitState(context, OUTPUTS, BRAKE) !== null;
   const target = context === null ? null : scaledAt(context, FEATHER_TARGET);
   const hold = (work: (one: Order) => Promise<unknown>) => {
     setFeathered(null);
@@ -45,26 +52,30 @@ export function TrySection({ device, context }: { device: string; context: Devic
         >
           {t("page.motion.hold_enabled")}
         </RunButton>
-        <RunButton
-          hint={t("page.motion.feather_hint", {
-            angle: target === null ? "–" : figure(target, 1, t.language),
-          })}
-          disabled={disabled}
-          active={doing === "feather"}
-          onPress={() => hold((one) => moving.feather(device, one).then(setFeathered))}
-          testId="try-feather"
-        >
-          {t("page.motion.feather")}
-        </RunButton>
-        <RunButton
-          hint={t("page.motion.brake_hint")}
-          disabled={disabled}
-          active={doing === "brake_test"}
-          onPress={() => hold((one) => moving.brakeTest(device, one).then(setBrake))}
-          testId="brake-test"
-        >
-          {t("page.motion.brake")}
-        </RunButton>
+        {feathers && (
+          <RunButton
+            hint={t("page.motion.feather_hint", {
+              angle: target === null ? "–" : figure(target, 1, t.language),
+            })}
+            disabled={disabled}
+            active={doing === "feather"}
+            onPress={() => hold((one) => moving.feather(device, one).then(setFeathered))}
+            testId="try-feather"
+          >
+            {t("page.motion.feather")}
+          </RunButton>
+        )}
+        {hasBrake && (
+          <RunButton
+            hint={t("page.motion.brake_hint")}
+            disabled={disabled}
+            active={doing === "brake_test"}
+            onPress={() => hold((one) => moving.brakeTest(device, one).then(setBrake))}
+            testId="brake-test"
+          >
+            {t("page.motion.brake")}
+          </RunButton>
+        )}
       </div>
       {feathered && <FeatherResult found={feathered} />}
       {brake && <BrakeResult found={brake} />}

@@ -8,6 +8,8 @@ const ENTRIES = [1, 2, 3, 4, 5, 6, 7, 8];
 export const COUNT = "1003";
 const entryOf = (at: number) => `1003:0${at}`;
 const stampOf = (at: number) => `2030:0${at}`;
+/** A device that has it stamps its entries. */
+export const STAMP = stampOf(1);
 const LOW_WORD = 0x10000;
 
 /** Everything that is read for it. */

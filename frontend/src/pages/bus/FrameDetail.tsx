@@ -10,11 +10,13 @@ import classes from "./Bus.module.css";
 import {
   bytesOf,
   exactTime,
+  HEADER_BYTES,
   idText,
   noteTexts,
   objectName,
   partnerOf,
   serviceText,
+  shownBytes,
   valueText,
 } from "./lines";
 
@@ -38,7 +40,8 @@ export function FrameDetail({ line, rows, onPick }: Props) {
     >
       <header>
         <strong>
-          {idText(line)}h · {serviceText(line, t)}
+          {idText(line)}
+          {line.transaction === null && "h"} · {serviceText(line, t)}
           {line.device !== null && ` · ${nameOf(line.device)}`}
         </strong>
         <Narrow line={line} />
@@ -53,18 +56,7 @@ export function FrameDetail({ line, rows, onPick }: Props) {
           <span title={`${BigInt(line.t_ns).toString()} ns`}>{exactTime(line.t_ns)}</span>
         </Fact>
         {previous && <Fact name="since_previous">{ms(line.t_ns - previous.t_ns)} ms</Fact>}
-        <Fact name="identifier">
-          {idText(line)}h · {t(`trace.detail.${line.extended ? "extended" : "standard"}`)} · {line.bus} ·{" "}
-          {t(`trace.detail.direction_${line.direction}`)}
-          {line.remote && ` · ${t("trace.detail.remote")}`}
-        </Fact>
-        <Fact name="bytes">
-          <b className={classes.bytes}>{bytesOf(line.data).join(" ") || "–"}</b>
-          <span className="dim">
-            {" "}
-            {t("trace.detail.dlc")} {line.dlc}
-          </span>
-        </Fact>
+        {line.transaction === null ? <CanFacts line={line} /> : <AduFacts line={line} />}
         {line.step !== null && <Fact name="step">{t(`trace.step.${line.step}`)}</Fact>}
         {line.items.map((item, at) => (
           <Fact key={`${item.address}-${String(at)}`} name="object">
@@ -83,6 +75,46 @@ export function FrameDetail({ line, rows, onPick }: Props) {
         <Partner line={line} rows={rows} onPick={onPick} />
       </dl>
     </section>
+  );
+}
+
+function CanFacts({ line }: { line: TraceLine }) {
+  const t = useTexts();
+  return (
+    <>
+      <Fact name="identifier">
+        {idText(line)}h · {t(`trace.detail.${line.extended ? "extended" : "standard"}`)} · {line.bus} ·{" "}
+        {t(`trace.detail.direction_${line.direction}`)}
+        {line.remote && ` · ${t("trace.detail.remote")}`}
+      </Fact>
+      <Fact name="bytes">
+        <b className={classes.bytes}>{bytesOf(line.data).join(" ") || "–"}</b>
+        <span className="dim">
+          {" "}
+          {t("trace.detail.dlc")} {line.dlc}
+        </span>
+      </Fact>
+    </>
+  );
+}
+
+/** Of an ADU of Modbus TCP: its transaction, its connection, and its bytes with the header apart. */
+function AduFacts({ line }: { line: TraceLine }) {
+  const t = useTexts();
+  const bytes = bytesOf(line.data);
+  return (
+    <>
+      <Fact name="transaction">
+        {line.transaction} · {t("trace.detail.unit", { unit: parseInt(bytes[HEADER_BYTES - 1] ?? "", 16) })} ·{" "}
+        {line.bus} · {t(`trace.detail.direction_${line.direction}`)}
+      </Fact>
+      {line.peer !== null && line.peer !== "" && <Fact name="client">{line.peer}</Fact>}
+      <Fact name="bytes">
+        <span className="dim">{bytes.slice(0, HEADER_BYTES).join(" ")}</span>{" "}
+        <b className={classes.bytes}>{shownBytes(line).join(" ")}</b>
+        <span className="dim"> {t("trace.detail.adu_bytes", { count: line.dlc })}</span>
+      </Fact>
+    </>
   );
 }
 
@@ -127,9 +159,11 @@ function Narrow({ line }: { line: TraceLine }) {
   const address = line.items[0]?.address;
   return (
     <span className={classes.narrow}>
-      <Button px="sm" variant="default" onClick={() => update({ ids: idText(line) })}>
-        {t("trace.detail.only_id")}
-      </Button>
+      {line.transaction === null && (
+        <Button px="sm" variant="default" onClick={() => update({ ids: idText(line) })}>
+          {t("trace.detail.only_id")}
+        </Button>
+      )}
       {line.node > 0 && (
         <Button px="sm" variant="default" onClick={() => update({ nodes: String(line.node) })}>
           {t("trace.detail.only_node")}

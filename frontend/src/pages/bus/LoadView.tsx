@@ -1,5 +1,5 @@
 import { type BusLoadLine, useBusLoad, useIdentifiers } from "../../api/trace";
-import { figure } from "../../model/values";
+import { figure, rateText } from "../../model/values";
 import { useTexts } from "../../texts/texts";
 import { placeName, useDeviceOfNode } from "./nodeNames";
 import classes from "./Bus.module.css";
@@ -36,9 +36,7 @@ function OneBus({ bus }: { bus: BusLoadLine }) {
   return (
     <section className={classes.load}>
       <header>
-        <strong>
-          {t("trace.load.bus", { bus: bus.bus, kbit: figure(bus.bitrate / 1000, 0, t.language) })}
-        </strong>
+        <strong>{t("trace.load.bus", { bus: bus.bus, kbit: rateText(bus.bitrate, t.language) })}</strong>
         <span>
           {t("trace.load.now")} <b data-testid="load-now">{percent(bus.load)}</b>
         </span>
@@ -64,20 +62,22 @@ function OneBus({ bus }: { bus: BusLoadLine }) {
             ))}
           </ul>
         </div>
-        <div>
-          <h3>{t("trace.load.by_id")}</h3>
-          <ul>
-            {top.map((one) => (
-              <li key={idText(one)}>
-                <i style={{ background: colours.get(one.node) ?? "var(--hs-dim)" }} aria-hidden />
-                <span>
-                  <b>{idText(one)}</b> {serviceText(one, t)} {one.node > 0 && one.node}
-                </span>
-                <Share share={one.load} most={top[0]?.load ?? 1} text={percent(one.load)} />
-              </li>
-            ))}
-          </ul>
-        </div>
+        {top.length > 0 && (
+          <div>
+            <h3>{t("trace.load.by_id")}</h3>
+            <ul>
+              {top.map((one) => (
+                <li key={idText(one)}>
+                  <i style={{ background: colours.get(one.node) ?? "var(--hs-dim)" }} aria-hidden />
+                  <span>
+                    <b>{idText(one)}</b> {serviceText(one, t)} {one.node > 0 && one.node}
+                  </span>
+                  <Share share={one.load} most={top[0]?.load ?? 1} text={percent(one.load)} />
+                </li>
+              ))}
+            </ul>
+          </div>
+        )}
       </div>
     </section>
   );

@@ -29,10 +29,14 @@ export function NodeTable() {
         ? t("trace.table.not_seen")
         : row.silent
           ? t("trace.table.silent")
-          : row.nmt === null
-            ? "–"
-            : t(row.nmt);
+          : !row.managed
+            ? t("page.bench.alive")
+            : row.nmt === null
+              ? "–"
+              : t(row.nmt);
     const heartbeatOf = (row: BusNode) => {
+      if (!row.managed && row.answered_t_ns !== null)
+        return t("page.bench.answered", { age: agoOf(row.answered_t_ns) });
       if (row.heartbeat_t_ns === null) return "–";
       const period =
         row.period_ms === null

@@ -5,7 +5,12 @@ import { type Translate, useTexts } from "../../texts/texts";
 import { useDeviceName } from "../../ui/devices";
 import { timeOfDay } from "../../ui/format";
 import classes from "./Bus.module.css";
-import { bytesOf, idText, noteTexts, objectName, serviceText, valueText } from "./lines";
+import { idText, noteTexts, objectName, serviceText, shownBytes, valueText } from "./lines";
+
+/** A row has no room for more objects: all of them stand in the detail. */
+const SHOWN_ITEMS = 12;
+/** So many have room for their names. */
+const NAMED_ITEMS = 3;
 
 interface Props {
   line: TraceLine;
@@ -48,8 +53,8 @@ export const TraceRow = memo(function TraceRow({ line, top, index, picked, query
       <span role="gridcell" className={classes.clip}>
         {serviceText(line, t)}
       </span>
-      <b role="gridcell" className={classes.bytes}>
-        {line.remote ? "RTR" : bytesOf(line.data).join(" ")}
+      <b role="gridcell" className={`${classes.bytes} ${classes.clip}`}>
+        {line.remote ? "RTR" : shownBytes(line).join(" ")}
       </b>
       <span role="gridcell" className={classes.meaning}>
         <Meaning line={line} query={query} t={t} />
@@ -64,9 +69,18 @@ function Meaning({ line, query, t }: { line: TraceLine; query: string; t: Transl
     <>
       {Sign && <Sign size={13} aria-hidden />}
       {line.step !== null && <i>{t(`trace.step.${line.step}`)}</i>}
-      {line.items.map((item, at) => (
-        <Item key={`${item.address}-${String(at)}`} item={item} query={query} t={t} />
+      {line.items.slice(0, SHOWN_ITEMS).map((item, at) => (
+        <Item
+          key={`${item.address}-${String(at)}`}
+          item={item}
+          named={line.service !== "modbus-response" || line.items.length <= NAMED_ITEMS}
+          query={query}
+          t={t}
+        />
       ))}
+      {line.items.length > SHOWN_ITEMS && (
+        <em>{t("trace.page.more_objects", { count: line.items.length - SHOWN_ITEMS })}</em>
+      )}
       {noteTexts(line, t).map((note) => (
         <em key={note}>
           <Marked text={note} query={query} />
@@ -76,15 +90,24 @@ function Meaning({ line, query, t }: { line: TraceLine; query: string; t: Transl
   );
 }
 
-function Item({ item, query, t }: { item: TraceItem; query: string; t: Translate }) {
+interface ItemProps {
+  item: TraceItem;
+  named: boolean;
+  query: string;
+  t: Translate;
+}
+
+function Item({ item, named, query, t }: ItemProps) {
   return (
-    <span className={classes.item}>
+    <span className={classes.item} data-named={named} title={named ? undefined : objectName(item, t)}>
       <code>
         <Marked text={item.address} query={query} />
       </code>
-      <span className={classes.clip}>
-        <Marked text={objectName(item, t)} query={query} />
-      </span>
+      {named && (
+        <span className={classes.clip}>
+          <Marked text={objectName(item, t)} query={query} />
+        </span>
+      )}
       {item.text !== null && <b>{valueText(item, t)}</b>}
     </span>
   );

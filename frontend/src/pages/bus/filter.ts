@@ -10,6 +10,7 @@ export const GROUPS: Record<string, readonly string[]> = {
   heartbeat: ["heartbeat"],
   emcy: ["emcy"],
   sync: ["sync", "time"],
+  modbus: ["modbus-request", "modbus-response"],
   other: ["lss", "error", "twin", "unknown"],
 };
 

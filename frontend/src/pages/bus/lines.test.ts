@@ -4,7 +4,16 @@ import { describe, expect, it } from "vitest";
 import type { TraceItem, TraceLine } from "../../api/trace";
 import { translator } from "../../texts/texts";
 import { filterOf, GROUPS, isFiltered, listOf } from "./filter";
-import { bytesOf, exactTime, idText, meaningText, partnerOf, serviceText, valueText } from "./lines";
+import {
+  bytesOf,
+  exactTime,
+  idText,
+  meaningText,
+  partnerOf,
+  serviceText,
+  shownBytes,
+  valueText,
+} from "./lines";
 
 function flat(table: Record<string, unknown>, prefix = ""): Record<string, string> {
   return Object.fromEntries(
@@ -44,8 +53,21 @@ const line = (parts: Partial<TraceLine>): TraceLine =>
     notes: [],
     step: null,
     start_t_ns: null,
+    transaction: null,
+    peer: null,
     ...parts,
   }) as TraceLine;
+
+describe("a row of Modbus TCP", () => {
+  const adu = line({ service: "modbus-response", number: 43, transaction: 17, data: "001100000003002b0d00" });
+
+  it("names its transaction, its function and the bytes behind the header", () => {
+    expect(idText(adu)).toBe("#17");
+    expect(serviceText(adu, en)).toBe("FC 43 resp");
+    expect(serviceText(adu, de)).toBe("FC 43 Antw.");
+    expect(shownBytes(adu)).toEqual(["2B", "0D", "00"]);
+  });
+});
 
 describe("a row in words", () => {
   it("shows identifiers and bytes as they are printed", () => {

@@ -6,18 +6,30 @@ import { timeOfDay } from "../../ui/format";
 
 const NUMBER = /^-?\d+\.\d+$/;
 
-export const idText = (line: Pick<TraceLine, "can_id" | "extended">): string =>
-  line.can_id
-    .toString(16)
-    .toUpperCase()
-    .padStart(line.extended ? 8 : 3, "0");
+type Identified = Pick<TraceLine, "can_id" | "extended"> & Partial<Pick<TraceLine, "transaction">>;
+
+/** The identifier in hexadecimal; of an ADU the number of its transaction. */
+export const idText = (line: Identified): string =>
+  typeof line.transaction === "number"
+    ? `#${String(line.transaction)}`
+    : line.can_id
+        .toString(16)
+        .toUpperCase()
+        .padStart(line.extended ? 8 : 3, "0");
 
 export const bytesOf = (hex: string): string[] => hex.toUpperCase().match(/../g) ?? [];
 
-/** `TPDO2`, `SDO req`, `Heartbeat`. */
+/** Bytes of the MBAP header, which transaction, unit and length of the row tell as well. */
+export const HEADER_BYTES = 7;
+
+/** What a row shows of the bytes: of an ADU those behind its header. */
+export const shownBytes = (line: Pick<TraceLine, "data" | "transaction">): string[] =>
+  bytesOf(line.data).slice(line.transaction === null ? 0 : HEADER_BYTES);
+
+/** `TPDO2`, `SDO req`, `Heartbeat`, `FC 43 req`. */
 export function serviceText(line: Pick<TraceLine, "service" | "number">, t: Translate): string {
-  const name = t(`trace.service.${line.service}`);
-  return line.number > 0 ? `${name}${String(line.number)}` : name;
+  const name = t(`trace.service.${line.service}`, { number: line.number });
+  return !line.service.startsWith("modbus-") && line.number > 0 ? `${name}${String(line.number)}` : name;
 }
 
 export function objectName(item: TraceItem, t: Translate): string {

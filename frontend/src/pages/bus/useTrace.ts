@@ -48,14 +48,16 @@ export function useTrace() {
     },
   });
 
+  const asked = useRef<number | null>(null);
   useEffect(() => {
     const at = new URLSearchParams(location.search);
+    // A replay that stands begins at the same moment again: with another filter its rows are others.
+    asked.current = null;
     return watchTrace(channel, filter, frames.begin(at.has("paused") || at.has("frame")));
   }, [channel, frames, filter, epoch]);
 
   // What came before the running trace began, once, exactly up to its first frame; or the moment that is asked for.
   const { startNs } = view;
-  const asked = useRef<number | null>(null);
   useEffect(() => {
     if (startNs === null || asked.current === startNs) return;
     asked.current = startNs;

@@ -9,9 +9,10 @@ import { useQueries, useQuery } from "@tanstack/react-query";
 import { Link } from "@tanstack/react-router";
 import { useState } from "react";
 import { useDescriptionQuery, useTurbineQuery } from "../../api/queries";
-import type { Turbine } from "../../api/types";
+import type { Details, Turbine } from "../../api/types";
 import { type PageSearch, roomSearch } from "../../frame/search";
 import { useAxes, useHearing, useLink, useNodes, useServerNow, useStore } from "../../live/live";
+import { asVariant, variantOf } from "../../model/variant";
 import { type Translate, useTexts } from "../../texts/texts";
 import { placesOf } from "../../ui/devices";
 import { rawAt } from "../../ui/reading";
@@ -77,10 +78,17 @@ function useWatched(turbine: Turbine | undefined, t: Translate): Watched[] {
   return places.flatMap(({ station, device: { slug, node, description_id } }): Watched[] => {
     const doc = docs[ids.indexOf(description_id)]?.data;
     const cells = store.cells(slug);
-    if (!doc || !cells || station.blade === null) return [];
+    if (!doc || !cells) return [];
     const lookup = (address: string) => rawAt(store, slug, address);
-    return [{ station, context: { slug, node, doc, t, lookup }, cells }];
+    const own = asVariant(doc, variantOf(doc, lookup));
+    return [{ station, context: { slug, node, doc: own, t, lookup }, cells }];
   });
+}
+
+/** With the station's name as people say it. */
+function placed(details: Details, t: Translate): Details {
+  const { blade, station } = details;
+  return { ...details, station: typeof blade === "number" ? t("page.blade", { blade }) : (station ?? null) };
 }
 
 const ICONS = { error: IconAlertOctagon, warning: IconAlertTriangle, info: IconInfoCircle };
@@ -93,7 +101,7 @@ function FindingLine({ finding }: { finding: Finding }) {
     <li>
       <Icon size={18} className={finding.tone === "info" ? "dim" : `tone-${finding.tone}`} aria-hidden />
       <span className="visually-hidden">{t(`page.severity.${finding.tone}`)}</span>
-      <span>{t(finding.key, finding.details)}</span>
+      <span>{t(finding.key, placed(finding.details, t))}</span>
       {device !== null && (
         <Link to="/parameters" search={(before: PageSearch) => roomSearch(before, { device, ...more })}>
           {t("page.rooms.parameters")} <IconArrowRight size={15} aria-hidden />

@@ -3,16 +3,17 @@ import { useTurbineQuery } from "../../api/queries";
 import { useShown } from "../../live/live";
 import { Unconnected } from "../../frame/Unconnected";
 import { Attention } from "./Attention";
+import { BenchCard } from "./BenchCard";
 import { BladeCard } from "./BladeCard";
 import { SinceLastVisit } from "./SinceLastVisit";
 import classes from "./Overview.module.css";
 
-/** Three blades at one look, and above them what needs a look. */
+/** Three blades at one look, or what a bench has instead, and above them what needs a look. */
 export function OverviewPage() {
   const query = useQuery(useTurbineQuery());
   const { recorded } = useShown();
   const turbine = query.data;
-  const blades = (turbine?.stations ?? []).filter((station) => station.blade !== null);
+  const stations = turbine?.stations ?? [];
   return (
     <div className={classes.page}>
       <div className={classes.news}>
@@ -20,9 +21,13 @@ export function OverviewPage() {
         {!recorded && <SinceLastVisit />}
       </div>
       <div className={classes.cards}>
-        {blades.map((station) => (
-          <BladeCard key={station.slug} station={station} />
-        ))}
+        {stations.map((station) =>
+          station.blade === null ? (
+            <BenchCard key={station.slug} station={station} />
+          ) : (
+            <BladeCard key={station.slug} station={station} />
+          ),
+        )}
       </div>
       {query.isSuccess && !turbine && <Unconnected />}
     </div>

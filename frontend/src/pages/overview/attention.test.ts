@@ -16,7 +16,7 @@ const turbine: Turbine = {
       slug: "wtg-07/blade-1",
       name: "Blade 1",
       blade: 1,
-      devices: [{ slug: PMC, node: 11, description_id: "oat-pmc", name: "PMC" }],
+      devices: [{ slug: PMC, node: 11, description_id: "oat-pmc", name: "PMC", axis: true }],
     },
   ],
 };
@@ -51,6 +51,8 @@ const node = (ageMs: number | null): NodeData => ({
   heartbeat_t_ns: ageMs === null ? null : (NOW_MS - ageMs) * 1e6,
   heartbeat_period_ms: 500,
   boots: 1,
+  managed: true,
+  answered_t_ns: null,
 });
 const axis = (code: number, severity: "error" | "warning" = "error") =>
   ({

@@ -29,12 +29,13 @@ interface Seen {
 const URGENCY = ["error", "warning", "info"] as const;
 
 export function findingsOf(seen: Seen): Finding[] {
-  const all = [
+  const told = [
     ...linkFindings(seen.link),
     ...axisFindings(seen),
     ...nodeFindings(seen),
     ...(seen.more ?? []),
   ];
+  const all = [...new Map(told.map((one) => [one.id, one])).values()];
   return URGENCY.flatMap((tone) => all.filter((one) => one.tone === tone));
 }
 
@@ -63,6 +64,7 @@ function axisFindings({ axes }: Seen): Finding[] {
       key: `page.attention.${fault.severity === "error" ? "fault" : "device_warning"}`,
       details: {
         blade: axis.blade,
+        station: null,
         device: lastPart(fault.device),
         code: errorCode(fault.code),
         text_key_text: fault.text_key ?? "page.card.unknown_code",
@@ -79,7 +81,12 @@ function nodeFindings({ turbine, link, nodes, nowMs }: Seen): Finding[] {
   return placesOf(turbine).flatMap(({ station, device }): Finding[] => {
     const node = nodes.get(device.slug);
     const { heard, ageMs } = heartbeatOf(node, nowMs);
-    const details = { blade: station.blade, device: device.name, seconds: Math.round((ageMs ?? 0) / 1000) };
+    const details = {
+      blade: station.blade,
+      station: station.name,
+      device: device.name,
+      seconds: Math.round((ageMs ?? 0) / 1000),
+    };
     const finding = (tone: Finding["tone"], name: string): Finding[] => [
       { id: `${name}_${device.slug}`, tone, key: `page.attention.${name}`, details, device: device.slug },
     ];

@@ -5,7 +5,10 @@ import { type DeviceContext, lineOf, shownOf } from "../../model/shown";
 import { differsFromDefault, isUnsaved, rawOf } from "../parameters/cellValue";
 import { entriesOf } from "../../ui/reading";
 import type { PageSearch } from "../../frame/search";
+import { severityOf } from "../../model/axisState";
+import { errorCode } from "../../ui/format";
 import type { Finding } from "./attention";
+import { ERROR_CODE, STATUSWORD } from "./bench";
 import {
   BLOC_COUNT,
   BLOCS,
@@ -31,6 +34,7 @@ export interface Watched {
 
 export function deviceFindings(devices: readonly Watched[]): Finding[] {
   return [
+    ...devices.filter(({ station }) => station.blade === null).flatMap(faultFindings),
     ...devices.flatMap(temperatureFindings),
     ...devices.flatMap(chainFindings),
     ...devices.flatMap(batteryFindings),
@@ -54,10 +58,23 @@ function finding(
     id: `${name}_${context.slug}_${search?.q ?? ""}`,
     tone,
     key: `page.attention.${name}`,
-    details: { blade: station.blade, device, ...details },
+    details: { blade: station.blade, station: station.name, device, ...details },
     device: context.slug,
     ...(search ? { search } : {}),
   };
+}
+
+/** Of a station without a blade; the bench itself tells the faults of blades. */
+function faultFindings(watched: Watched): Finding[] {
+  const { context } = watched;
+  const [code, status] = [rawIn(watched, ERROR_CODE), rawIn(watched, STATUSWORD)];
+  if (typeof code !== "number" || code === 0) return [];
+  const severity = severityOf(typeof status === "number" ? status : null);
+  const known = context.doc.errors.find((one) => one.code === code);
+  const details = { code: errorCode(code), text_key_text: known?.text_key ?? "page.card.unknown_code" };
+  const name = severity === "error" ? "fault" : "device_warning";
+  const found = finding(watched, severity, name, details, { q: ERROR_CODE });
+  return [{ ...found, id: `fault_${context.slug}_${code}` }];
 }
 
 function shownAt(watched: Watched, address: string): string | null {

@@ -12,9 +12,17 @@ export interface Heartbeat {
   ageMs: number | null;
 }
 
-/** How long ago the node was heard. Whether that is too long the bench decides: it knows the period to the millisecond. */
+/** A device without heartbeats is read all the time: no answer for so long is none. */
+const ANSWER_LATE_MS = 5000;
+
+/**
+ * How long ago the node was heard: its heartbeat, or on a bus that has none its latest answer. Whether a heartbeat is too
+ * old the bench decides: it knows the period to the millisecond.
+ */
 export function heartbeatOf(node: NodeData | undefined, nowMs: number): Heartbeat {
-  if (node?.heartbeat_t_ns == null) return { heard: Heard.Never, ageMs: null };
-  const ageMs = Math.max(0, nowMs - node.heartbeat_t_ns / 1e6);
-  return { heard: node.silent ? Heard.Overdue : Heard.Alive, ageMs };
+  const heardNs = node?.managed === false ? node.answered_t_ns : node?.heartbeat_t_ns;
+  if (node === undefined || heardNs == null) return { heard: Heard.Never, ageMs: null };
+  const ageMs = Math.max(0, nowMs - heardNs / 1e6);
+  const overdue = node.managed ? node.silent : ageMs > ANSWER_LATE_MS;
+  return { heard: overdue ? Heard.Overdue : Heard.Alive, ageMs };
 }

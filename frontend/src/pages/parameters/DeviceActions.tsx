@@ -1,5 +1,5 @@
 import { Button } from "@mantine/core";
-import { IconDeviceFloppy, IconRefresh, IconRotateClockwise2 } from "@tabler/icons-react";
+import { IconDeviceFloppy, IconListCheck, IconRefresh, IconRotateClockwise2 } from "@tabler/icons-react";
 import { useState } from "react";
 import { useTexts } from "../../texts/texts";
 import { useBenchOfTable, useDevice } from "./context";
@@ -7,10 +7,12 @@ import { RestartDialog, SaveDialog } from "./DeviceDialogs";
 import classes from "./Parameters.module.css";
 import { useReadAll, useReadMany } from "./readAll";
 import { useSilent } from "./silent";
+import { VerifyDialog } from "./VerifyDialog";
 
 enum Dialog {
   Save,
   Restart,
+  Verify,
 }
 
 /** Reading is for all that is shown; a save or a restart is always for one device, the one that was picked. */
@@ -49,6 +51,20 @@ export function DeviceActions() {
           </Button>
         </>
       )}
+      {!side && doc.bus === "modbus-tcp" && (
+        <Button
+          px="sm"
+          variant="default"
+          leftSection={<IconListCheck size={17} aria-hidden />}
+          disabled={barred}
+          title={t("page.device_check.open_title")}
+          onClick={() => setDialog(Dialog.Verify)}
+          data-testid="verify"
+        >
+          {t("page.device_check.open")}
+        </Button>
+      )}
+      {dialog === Dialog.Verify && <VerifyDialog onClose={close} />}
       {dialog === Dialog.Save && <SaveDialog doc={doc} onClose={close} />}
       {dialog === Dialog.Restart && <RestartDialog doc={doc} onClose={close} />}
     </div>

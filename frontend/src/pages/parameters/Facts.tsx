@@ -1,10 +1,10 @@
 import { useQueries } from "@tanstack/react-query";
+import { IconQuestionMark } from "@tabler/icons-react";
 import type { EntryDoc } from "../../api/types";
-import { restsOn } from "../../model/values";
 import { type ParameterRow, titleOf } from "../../model/rows";
 import { categoryName } from "../../model/saving";
 import { limitText } from "../../model/shown";
-import { isHex, quantityOf } from "../../model/values";
+import { isHex, quantityOf, restsOn } from "../../model/values";
 import { useBenchOfTable, useDevice } from "./context";
 import { detailsOf, historyQuery } from "./history";
 import classes from "./Parameters.module.css";
@@ -29,12 +29,20 @@ export function Facts({ row, onOpen }: Props) {
     ["verify", t(`page.verify.${entry.verify}`)],
     ["section", entry.section || "–"],
   ];
-  if (entry.save_category !== null) facts.push(["save_category", categoryName(entry.save_category, t)]);
-  const needs = entry.requires.map(({ address, values }) => `${address} = ${values.map(String).join(", ")}`);
+  if (doc.save.some((command) => command.category !== null) && entry.saved)
+    facts.splice(3, 0, [
+      "category",
+      entry.save_category === null ? t("page.entry.any_category") : categoryName(entry.save_category, t),
+    ]);
+  const needs = entry.requires.map(({ address, values, writing = [] }) => {
+    const need = `${address} = ${values.map(String).join(", ")}`;
+    return writing.length > 0 ? `${writing.map(String).join(", ")}: ${need}` : need;
+  });
   if (needs.length > 0) facts.push(["requires", needs.join("; ")]);
   return (
     <div className={classes.facts}>
       {entry.note !== null && <p>{t(entry.note)}</p>}
+      {entry.inferred && <Inferred entry={entry} />}
       <dl>
         {facts.map(([name, text]) => (
           <div key={name} data-testid={`entry-${name}`}>
@@ -47,6 +55,22 @@ export function Facts({ row, onOpen }: Props) {
       <Links title={t("page.entry.used_by")} addresses={usedBy(entry, doc.entries)} onOpen={onOpen} />
       <History entry={entry} />
     </div>
+  );
+}
+
+/** What the device's own manual does not print of the object, and what tells it instead. */
+function Inferred({ entry: { unproven, origin } }: { entry: EntryDoc }) {
+  const { t, doc } = useDevice();
+  const facts =
+    unproven.length === 0
+      ? t("page.entry.inferred_all")
+      : unproven.map((fact) => t(`page.entry.fact.${fact}`)).join(", ");
+  const source = origin === null ? t("page.entry.no_origin") : (doc.sources[origin] ?? origin);
+  return (
+    <p className={classes.inferred} data-testid="inferred">
+      <IconQuestionMark size={15} aria-hidden />
+      <span>{t("page.entry.inferred", { facts, source })}</span>
+    </p>
   );
 }
 

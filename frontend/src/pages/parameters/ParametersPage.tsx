@@ -5,7 +5,8 @@ import { sessionQuery, useDescriptionQuery, useTurbineQuery } from "../../api/qu
 import type { DescriptionDoc } from "../../api/types";
 import { usePageSearch } from "../../frame/search";
 import { Unconnected } from "../../frame/Unconnected";
-import { useShown, useWatchDevice } from "../../live/live";
+import { SAID } from "../../model/variant";
+import { useCell, useShown, useWatchDevice } from "../../live/live";
 import { useTexts } from "../../texts/texts";
 import { placesOf, stationName } from "../../ui/devices";
 import { ProblemAlert } from "../../ui/ProblemAlert";
@@ -76,6 +77,9 @@ function Room({ selection, doc }: RoomProps) {
     [kind, doc, t, store],
   );
   const activeSlug = active.device.slug;
+  // Defaults and limits follow the variant as soon as the device has said which it is.
+  useCell(activeSlug, SAID[0]);
+  useCell(activeSlug, SAID[1]);
   const device = siblings.find((one) => one.slug === activeSlug) ?? siblings[0];
   const bench = useMemo<Bench>(
     () => ({

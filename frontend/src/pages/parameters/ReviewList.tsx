@@ -17,6 +17,7 @@ import { type Place, useDeviceName } from "../../ui/devices";
 import { HoldButton } from "../../ui/HoldButton";
 import { useContexts } from "./devicesOf";
 import { FindingList } from "./FindingList";
+import { ReviewAddress } from "./ReviewAddress";
 import { ReviewOrder } from "./ReviewOrder";
 import { RuleFindingList } from "./RuleFindingList";
 import { JudgedContext } from "./rules";
@@ -37,6 +38,7 @@ interface DevicePlan {
 export function ReviewList({ places, onClose }: { places: readonly Place[]; onClose: () => void }) {
   const t = useTexts();
   const [accepted, setAccepted] = useState(false);
+  const [addressOf, setAddressOf] = useState("");
   const planned = usePlans(places);
   const order = useQuery(
     writesPlanQuery(
@@ -59,6 +61,10 @@ export function ReviewList({ places, onClose }: { places: readonly Place[]; onCl
     if (!next.delete(slug)) next.add(slug);
     setNoSave(next);
   };
+  // What was confirmed is this change of the address, not the next one.
+  const moved = order.data?.address_changes ?? [];
+  const moving = JSON.stringify(moved);
+  const addressConfirmed = moved.length === 0 || addressOf === moving;
   if (rows.length === 0) return <Nothing onClose={onClose} />;
   return (
     <Stack gap="md">
@@ -89,6 +95,11 @@ export function ReviewList({ places, onClose }: { places: readonly Place[]; onCl
       </Group>
       <RulesOfReview />
       <ReviewOrder plan={order.data} accepted={accepted} onAccept={setAccepted} />
+      <ReviewAddress
+        changes={moved}
+        confirmed={addressConfirmed}
+        onConfirm={(confirmed) => setAddressOf(confirmed ? moving : "")}
+      />
       <Blocked stopped={stopped} asked={asked} />
       <Group justify="space-between">
         <Button
@@ -106,8 +117,16 @@ export function ReviewList({ places, onClose }: { places: readonly Place[]; onCl
           <HoldButton
             tone="accent"
             hint={t("page.hold")}
-            disabled={stopped > 0 || asked > 0 || unordered || write.isPending}
-            onHeld={() => write.mutate({ changes: rows.map((row) => row.change), save, onFailure, accepted })}
+            disabled={stopped > 0 || asked > 0 || unordered || !addressConfirmed || write.isPending}
+            onHeld={() =>
+              write.mutate({
+                changes: rows.map((row) => row.change),
+                save,
+                onFailure,
+                accepted,
+                addressConfirmed: moved.length > 0 && addressConfirmed,
+              })
+            }
             testId="write-hold"
           >
             {t("page.review.write", { count: rows.length, devices: plans.length })}

@@ -6,13 +6,24 @@ import type { DescriptionDoc } from "../../api/types";
 import { useStore } from "../../live/live";
 import type { LiveStore } from "../../live/store";
 import type { DeviceContext } from "../../model/shown";
+import type { Lookup } from "../../model/values";
+import { asVariant, variantOf } from "../../model/variant";
 import { type Translate, useTexts } from "../../texts/texts";
 import type { Place } from "../../ui/devices";
 import { rawOf } from "./cellValue";
 
 export function contextOf(place: Place, doc: DescriptionDoc, t: Translate, store: LiveStore): DeviceContext {
   const { slug, node } = place.device;
-  return { slug, node, doc, t, lookup: (address) => rawOf(store.cell(slug, address)) };
+  const lookup: Lookup = (address) => rawOf(store.cell(slug, address));
+  return {
+    slug,
+    node,
+    get doc() {
+      return asVariant(doc, variantOf(doc, lookup));
+    },
+    t,
+    lookup,
+  };
 }
 
 /** The devices whose description is loaded, by slug. */

@@ -16,6 +16,8 @@ export interface Order {
   onFailure: WritesRequest["on_failure"];
   /** Rules that hold at every step may be broken where they are in the end. */
   accepted: boolean;
+  /** The devices' network addresses may change: a person knows that the connection will be lost. */
+  addressConfirmed: boolean;
 }
 
 export interface Writing {
@@ -48,12 +50,13 @@ export function useFinishWriting(): void {
 export function useWrite() {
   const t = useTexts();
   return useMutation({
-    mutationFn: ({ changes, save, onFailure, accepted }: Order) =>
+    mutationFn: ({ changes, save, onFailure, accepted, addressConfirmed }: Order) =>
       commands.writes({
         rows: changes.map(({ device, address, raw, from }) => ({ device, address, raw, expected_raw: from })),
         save,
         on_failure: onFailure,
         accepted,
+        address_confirmed: addressConfirmed,
       }),
     onSuccess: (job, { changes }) => {
       queryClient.setQueryData(["job", job.id], job);

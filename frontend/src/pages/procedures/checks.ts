@@ -2,6 +2,7 @@
 import type { LinkData, NodeData, RecordingStatus, SetRecord, Turbine } from "../../api/types";
 import type { Cell } from "../../live/store";
 import { placesOf } from "../../ui/devices";
+import { Heard, heartbeatOf } from "../overview/nodes";
 import { isUnsaved } from "../parameters/cellValue";
 import type { DescriptionDoc } from "../../api/types";
 
@@ -49,8 +50,7 @@ const recordingOf = ({ link }: Facts): RecordingStatus | null => link?.recording
 
 function heardOf(facts: Facts): number {
   return devicesOf(facts).filter((device) => {
-    const node = facts.nodes.get(device.slug);
-    return node?.heartbeat_t_ns != null && !node.silent;
+    return heartbeatOf(facts.nodes.get(device.slug), facts.nowMs).heard === Heard.Alive;
   }).length;
 }
 

@@ -1,17 +1,15 @@
-import { ActionIcon, Autocomplete, Button, NumberInput, Select, TextInput, Tooltip } from "@mantine/core";
+import { ActionIcon, Button, Select, TextInput, Tooltip } from "@mantine/core";
 import { IconPlus, IconRadar2, IconTrash } from "@tabler/icons-react";
-import { useQuery } from "@tanstack/react-query";
 import { useState } from "react";
-import { adaptersQuery, type Site, type SiteBus, type SiteTurbine } from "../../api/settings";
+import { type Site, type SiteBus, type SiteTurbine } from "../../api/settings";
 import { useTexts } from "../../texts/texts";
-import { typedNumber } from "../../ui/typedNumber";
-import { kbit } from "./AdaptersSection";
+import { AddressPanel } from "./AddressPanel";
+import { CanFields, RangeFields } from "./BusFields";
 import { useFlaw } from "./flaws";
+import { asModbus, isModbus } from "./modbusDraft";
 import { ScanPanel } from "./ScanPanel";
 import classes from "./Settings.module.css";
 import { NEW_BUS } from "./siteDraft";
-
-const RATES = [10_000, 20_000, 50_000, 125_000, 250_000, 500_000, 800_000, 1_000_000];
 
 interface Props {
   site: Site;
@@ -21,7 +19,7 @@ interface Props {
   onChange: (draft: SiteTurbine) => void;
 }
 
-/** The buses of a turbine; each can be scanned, and found devices taken over into the draft. */
+/** The buses of a turbine. A CAN bus can be scanned, one of Modbus TCP asked address by address, and devices taken over. */
 export function BusEditor({ site, draft, before, onChange }: Props) {
   const t = useTexts();
   const [scanning, setScanning] = useState<string | null>(null);
@@ -42,12 +40,15 @@ export function BusEditor({ site, draft, before, onChange }: Props) {
             scanning={scanning === bus.name}
             onScan={() => setScanning(scanning === bus.name ? null : bus.name)}
           />
-          {scanning === bus.name && (
+          {scanning === bus.name && isModbus(bus) && (
+            <AddressPanel bus={bus} draft={draft} site={site} onAdded={onChange} />
+          )}
+          {scanning === bus.name && !isModbus(bus) && (
             <ScanPanel
               key={bus.connection}
               bus={bus}
               draft={draft}
-              descriptions={site.descriptions}
+              descriptions={site.descriptions.filter((one) => one.bus === "canopen")}
               onTaken={onChange}
             />
           )}
@@ -89,15 +90,14 @@ interface RowProps {
   onScan: () => void;
 }
 
-function BusRow({ bus, fixed, scanning, onChange, onRemove, onScan }: RowProps) {
+function BusRow({ bus, fixed, onChange, onRemove, scanning, onScan }: RowProps) {
   const t = useTexts();
   const at = `bus.${bus.name}`;
   const nameFlaw = useFlaw(`${at}.name`);
   const connectionFlaw = useFlaw(`${at}.connection`);
-  const bitrateFlaw = useFlaw(`${at}.bitrate`);
-  const heartbeatFlaw = useFlaw(`${at}.heartbeat_node`);
-  const adapters = useQuery(adaptersQuery).data?.adapters ?? [];
-  const inText = bus.connection.includes("@");
+  const rangesFlaw = useFlaw(`${at}.ranges`);
+  const tcp = isModbus(bus);
+  const incomplete = tcp ? bus.ranges.length === 0 || rangesFlaw !== undefined : bus.connection === "";
   return (
     <div className={classes.row} style={{ alignItems: "flex-start" }}>
       <TextInput
@@ -109,59 +109,33 @@ function BusRow({ bus, fixed, scanning, onChange, onRemove, onScan }: RowProps) 
         variant={fixed ? "filled" : "default"}
         onChange={(event) => onChange({ ...bus, name: event.currentTarget.value })}
       />
-      <Autocomplete
-        style={{ flex: "1 1 240px" }}
-        label={t("page.settings.turbines.connection")}
-        placeholder={t("page.settings.adapters.other_hint")}
-        data={adapters.map((one) => one.connection)}
-        value={bus.connection}
-        error={connectionFlaw}
-        styles={{ input: { minHeight: 40 } }}
-        onChange={(connection) => onChange({ ...bus, connection })}
-        data-testid="bus-connection"
-      />
       <Select
-        w={130}
-        label={t("page.settings.adapters.bitrate")}
-        data={ratesWith(bus.bitrate).map((rate) => ({
-          value: String(rate),
-          label: rate === 0 ? "–" : kbit(rate, t),
-        }))}
-        value={inText ? null : String(bus.bitrate)}
-        placeholder={inText ? t("page.settings.turbines.in_connection") : undefined}
-        disabled={inText}
-        error={bitrateFlaw}
+        w={136}
+        label={t("page.settings.modbus.kind")}
+        data={[
+          { value: "can", label: t("page.settings.modbus.can") },
+          { value: "tcp", label: t("page.settings.modbus.tcp") },
+        ]}
+        value={tcp ? "tcp" : "can"}
         allowDeselect={false}
-        onChange={(text) => onChange({ ...bus, bitrate: Number(text) })}
+        onChange={(kind) => onChange(ofKind(bus, kind === "tcp", fixed))}
+        data-testid={`bus-kind-${bus.name}`}
       />
-      <Tooltip label={t("page.settings.turbines.heartbeat_explain")} multiline w={280}>
-        <NumberInput
-          w={104}
-          label={t("page.settings.turbines.heartbeat_node")}
-          value={bus.heartbeat_node}
-          error={heartbeatFlaw}
-          min={1}
-          max={127}
-          allowDecimal={false}
-          clampBehavior="strict"
-          onChange={(value) => typedNumber(value, (node) => onChange({ ...bus, heartbeat_node: node }))}
-          data-testid="heartbeat-node"
-        />
-      </Tooltip>
+      {tcp ? <RangeFields bus={bus} onChange={onChange} /> : <CanFields bus={bus} onChange={onChange} />}
       <Button
-        mt={25}
+        mt={22}
         variant={scanning ? "filled" : "default"}
         aria-expanded={scanning}
-        leftSection={<IconRadar2 size={18} aria-hidden />}
-        disabled={bus.connection === "" || connectionFlaw !== undefined}
+        leftSection={tcp ? <IconPlus size={18} aria-hidden /> : <IconRadar2 size={18} aria-hidden />}
+        disabled={incomplete || connectionFlaw !== undefined}
         onClick={onScan}
-        data-testid={`scan-${bus.name}`}
+        data-testid={tcp ? `by-address-${bus.name}` : `scan-${bus.name}`}
       >
-        {t("page.settings.scan.open")}
+        {t(tcp ? "page.settings.modbus.open" : "page.settings.scan.open")}
       </Button>
       <Tooltip label={t("page.settings.turbines.remove_bus", { bus: bus.name })}>
         <ActionIcon
-          mt={25}
+          mt={22}
           aria-label={t("page.settings.turbines.remove_bus", { bus: bus.name })}
           onClick={onRemove}
         >
@@ -172,5 +146,9 @@ function BusRow({ bus, fixed, scanning, onChange, onRemove, onScan }: RowProps) 
   );
 }
 
-const ratesWith = (rate: number): number[] =>
-  RATES.includes(rate) ? RATES : [...RATES, rate].sort((a, b) => a - b);
+/** The bus as one of the other kind; the name stays where it is permanent. */
+function ofKind(bus: SiteBus, tcp: boolean, fixed: boolean): SiteBus {
+  if (tcp === isModbus(bus)) return bus;
+  const other = tcp ? asModbus(bus) : { name: bus.name, ...NEW_BUS };
+  return fixed ? { ...other, name: bus.name } : other;
+}

@@ -132,8 +132,8 @@ function Loads({ draft }: { draft: Polling }) {
       <h2>{t("page.settings.polling.load")}</h2>
       {draft.buses.map((bus) => {
         const load = loadOf(draft, bus);
-        const shown = Number.isFinite(load) ? `${figure(load * 100, 1, t.language)} %` : "–";
-        const over = load > draft.load_cap;
+        const shown = load !== null && Number.isFinite(load) ? `${figure(load * 100, 1, t.language)} %` : "–";
+        const over = load !== null && load > draft.load_cap;
         return (
           <div
             key={`${bus.turbine} ${bus.bus}`}
@@ -142,15 +142,20 @@ function Loads({ draft }: { draft: Polling }) {
           >
             <div className={classes.row} style={{ marginBottom: 4 }}>
               <span>
-                {bus.turbine} · {bus.bus} · {bus.bitrate / 1000} kbit/s
+                {bus.turbine} · {bus.bus}
+                {bus.bitrate > 0 && ` · ${String(bus.bitrate / 1000)} kbit/s`}
               </span>
               <span className={classes.spacer} />
               <strong className={over ? "tone-error" : ""}>{shown}</strong>
             </div>
-            <div className={classes.bar} data-over={over} aria-hidden>
-              <span style={{ width: `${Math.min(100, load * 100)}%` }} />
-              <i style={{ left: `${draft.load_cap * 100}%` }} />
-            </div>
+            {load === null ? (
+              <p className={classes.places}>{t("page.settings.modbus.no_load")}</p>
+            ) : (
+              <div className={classes.bar} data-over={over} aria-hidden>
+                <span style={{ width: `${Math.min(100, load * 100)}%` }} />
+                <i style={{ left: `${draft.load_cap * 100}%` }} />
+              </div>
+            )}
             {over && <div className="tone-error">{t("page.settings.polling.over")}</div>}
           </div>
         );

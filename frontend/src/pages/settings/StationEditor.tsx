@@ -1,8 +1,10 @@
 import { ActionIcon, Button, NumberInput, Select, TextInput, Tooltip } from "@mantine/core";
 import { IconPlus, IconTrash } from "@tabler/icons-react";
-import type { Site, SiteDevice, SiteStation, SiteTurbine } from "../../api/settings";
+import type { Site, SiteBus, SiteDevice, SiteStation, SiteTurbine } from "../../api/settings";
 import { useTexts } from "../../texts/texts";
+import { AddressRow } from "./AddressRow";
 import { useFlaw } from "./flaws";
+import { freeNode, freeSlug, isModbus } from "./modbusDraft";
 import classes from "./Settings.module.css";
 import { deviceAt, stationAt } from "./siteDraft";
 
@@ -66,7 +68,7 @@ export function StationEditor({ station, draft, descriptions, known, onChange, o
                   key={place}
                   at={deviceAt(station, device)}
                   device={device}
-                  buses={draft.buses.map((bus) => bus.name)}
+                  buses={draft.buses}
                   descriptions={descriptions}
                   fixed={known?.devices.some((one) => one.slug === device.slug) ?? false}
                   onChange={(changed) => devices(station.devices.with(place, changed))}
@@ -81,7 +83,7 @@ export function StationEditor({ station, draft, descriptions, known, onChange, o
         mt={8}
         variant="default"
         leftSection={<IconPlus size={18} aria-hidden />}
-        onClick={() => devices([...station.devices, newDevice(station, draft)])}
+        onClick={() => devices([...station.devices, newDevice(station, draft, descriptions)])}
         data-testid={`add-device-${station.slug}`}
       >
         {t("page.settings.turbines.add_device")}
@@ -90,7 +92,21 @@ export function StationEditor({ station, draft, descriptions, known, onChange, o
   );
 }
 
-function newDevice(station: SiteStation, draft: SiteTurbine): SiteDevice {
+function newDevice(station: SiteStation, draft: SiteTurbine, descriptions: Site["descriptions"]): SiteDevice {
+  const bus = draft.buses[0];
+  if (isModbus(bus)) {
+    const slug = freeSlug(station);
+    const kinds = descriptions.filter((one) => one.bus === "modbus-tcp");
+    return {
+      slug,
+      name: slug.toUpperCase(),
+      description_id: (kinds.length === 1 ? kinds[0]?.id : undefined) ?? "",
+      bus: bus?.name ?? "",
+      node: freeNode(draft, bus?.name ?? ""),
+      address: "",
+      external_stop: "",
+    };
+  }
   const taken = station.devices.map((one) => one.slug);
   const slug = ["pmm", "pmc"].find((one) => !taken.includes(one)) ?? "";
   const base = slug === "pmc" ? 10 : 0;
@@ -98,15 +114,17 @@ function newDevice(station: SiteStation, draft: SiteTurbine): SiteDevice {
     slug,
     name: slug.toUpperCase(),
     description_id: slug === "" ? "" : `oat-${slug}`,
-    bus: draft.buses[0]?.name ?? "",
+    bus: bus?.name ?? "",
     node: station.blade === null ? base + 1 : base + station.blade,
+    address: "",
+    external_stop: "",
   };
 }
 
 interface DeviceProps {
   at: string;
   device: SiteDevice;
-  buses: string[];
+  buses: SiteBus[];
   descriptions: Site["descriptions"];
   fixed: boolean;
   onChange: (device: SiteDevice) => void;
@@ -116,81 +134,93 @@ interface DeviceProps {
 function DeviceRow({ at, device, buses, descriptions, fixed, onChange, onRemove }: DeviceProps) {
   const t = useTexts();
   const cell = { paddingLeft: 0, verticalAlign: "top" } as const;
-  const known = descriptions.map((one) => ({ value: one.id, label: one.name }));
+  const bus = buses.find((one) => one.name === device.bus);
+  const tcp = isModbus(bus);
+  const fitting = descriptions.filter((one) => one.bus === (tcp ? "modbus-tcp" : "canopen"));
+  const known = fitting.map((one) => ({ value: one.id, label: one.name }));
   const own = known.some((one) => one.value === device.description_id) || device.description_id === "";
   const slugFlaw = useFlaw(`${at}.slug`);
   const nameFlaw = useFlaw(`${at}.name`);
   const descriptionFlaw = useFlaw(`${at}.description`);
   const busFlaw = useFlaw(`${at}.bus`);
   const nodeFlaw = useFlaw(`${at}.node`);
+  const moveTo = (name: string | null) => {
+    const to = buses.find((one) => one.name === name);
+    const stays = isModbus(to) === tcp;
+    const kind = stays ? {} : { description_id: "", address: "" };
+    onChange({ ...device, ...kind, bus: name ?? "" });
+  };
   return (
-    <tr data-testid={`device-${device.slug}`}>
-      <td style={cell}>
-        <TextInput
-          w={104}
-          aria-label={t("page.settings.turbines.slug")}
-          value={device.slug}
-          error={slugFlaw}
-          readOnly={fixed}
-          variant={fixed ? "filled" : "default"}
-          onChange={(event) => onChange({ ...device, slug: event.currentTarget.value })}
-        />
-      </td>
-      <td style={cell}>
-        <TextInput
-          w={120}
-          aria-label={t("page.settings.turbines.device")}
-          value={device.name}
-          error={nameFlaw}
-          onChange={(event) => onChange({ ...device, name: event.currentTarget.value })}
-        />
-      </td>
-      <td style={cell}>
-        <Select
-          w={160}
-          aria-label={t("page.settings.turbines.description")}
-          data={own ? known : [...known, { value: device.description_id, label: device.description_id }]}
-          value={device.description_id || null}
-          error={descriptionFlaw}
-          allowDeselect={false}
-          onChange={(id) => onChange({ ...device, description_id: id ?? "" })}
-        />
-      </td>
-      <td style={cell}>
-        <Select
-          w={92}
-          aria-label={t("page.settings.turbines.bus")}
-          data={buses.filter((bus) => bus !== "")}
-          value={buses.includes(device.bus) ? device.bus : null}
-          error={busFlaw}
-          allowDeselect={false}
-          onChange={(bus) => onChange({ ...device, bus: bus ?? "" })}
-        />
-      </td>
-      <td style={cell}>
-        <NumberInput
-          w={84}
-          aria-label={t("page.settings.turbines.node")}
-          value={device.node}
-          error={nodeFlaw}
-          hideControls
-          allowDecimal={false}
-          allowNegative={false}
-          styles={{ input: { minHeight: 40 } }}
-          onChange={(node) => onChange({ ...device, node: typeof node === "number" ? node : 0 })}
-          data-testid="device-node"
-        />
-      </td>
-      <td style={{ ...cell, paddingRight: 0, textAlign: "right" }}>
-        <Tooltip label={t("page.settings.turbines.remove_device", { device: device.name })}>
-          <ActionIcon
-            aria-label={t("page.settings.turbines.remove_device", { device: device.name })}
-            onClick={onRemove}
-          >
-            <IconTrash size={18} aria-hidden />
-          </ActionIcon>
-        </Tooltip>
-      </td>
-    </tr>
+    <>
+      <tr data-testid={`device-${device.slug}`}>
+        <td style={cell}>
+          <TextInput
+            w={104}
+            aria-label={t("page.settings.turbines.slug")}
+            value={device.slug}
+            error={slugFlaw}
+            readOnly={fixed}
+            variant={fixed ? "filled" : "default"}
+            onChange={(event) => onChange({ ...device, slug: event.currentTarget.value })}
+          />
+        </td>
+        <td style={cell}>
+          <TextInput
+            w={120}
+            aria-label={t("page.settings.turbines.device")}
+            value={device.name}
+            error={nameFlaw}
+            onChange={(event) => onChange({ ...device, name: event.currentTarget.value })}
+          />
+        </td>
+        <td style={cell}>
+          <Select
+            w={160}
+            aria-label={t("page.settings.turbines.description")}
+            data={own ? known : [...known, { value: device.description_id, label: device.description_id }]}
+            value={device.description_id || null}
+            error={descriptionFlaw}
+            allowDeselect={false}
+            onChange={(id) => onChange({ ...device, description_id: id ?? "" })}
+          />
+        </td>
+        <td style={cell}>
+          <Select
+            w={92}
+            aria-label={t("page.settings.turbines.bus")}
+            data={buses.map((one) => one.name).filter((name) => name !== "")}
+            value={bus?.name ?? null}
+            error={busFlaw}
+            allowDeselect={false}
+            onChange={moveTo}
+          />
+        </td>
+        <td style={cell}>
+          <NumberInput
+            w={84}
+            aria-label={t("page.settings.turbines.node")}
+            value={device.node}
+            error={nodeFlaw}
+            hideControls
+            allowDecimal={false}
+            allowNegative={false}
+            styles={{ input: { minHeight: 40 } }}
+            onChange={(node) => onChange({ ...device, node: typeof node === "number" ? node : 0 })}
+            data-testid="device-node"
+          />
+        </td>
+        <td style={{ ...cell, paddingRight: 0, textAlign: "right" }}>
+          <Tooltip label={t("page.settings.turbines.remove_device", { device: device.name })}>
+            <ActionIcon
+              aria-label={t("page.settings.turbines.remove_device", { device: device.name })}
+              onClick={onRemove}
+            >
+              <IconTrash size={18} aria-hidden />
+            </ActionIcon>
+          </Tooltip>
+        </td>
+      </tr>
+      {tcp && <AddressRow at={at} device={device} onChange={onChange} />}
+    </>
   );
 }

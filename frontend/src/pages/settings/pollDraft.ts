@@ -34,8 +34,9 @@ export function perSecond(polling: Polling, rate: Rate): number {
   return 1 / (polling.period_s * every);
 }
 
-/** Share of the bus that polling takes, 0..1; above 1 it does not fit. */
-export function loadOf(polling: Polling, bus: PollBus): number {
+/** Share of the bus that polling takes, 0..1; above 1 it does not fit. Null where the bus has no bit rate. */
+export function loadOf(polling: Polling, bus: PollBus): number | null {
+  if (bus.bitrate === 0) return null;
   const bits = polling.devices.reduce(
     (sum, device) => sum + (bus.counts[device.description_id] ?? 0) * bitsOf(polling, device),
     0,

@@ -5,13 +5,23 @@ import { emptyTurbine, fieldOf, flawsOf, isKnown, takeOver } from "./siteDraft";
 const turbine = (): SiteTurbine => ({
   slug: "wtg-08",
   name: "WTG-08",
-  buses: [{ name: "can0", connection: "socketcan:can0", bitrate: 500_000, heartbeat_node: 126 }],
+  buses: [{ name: "can0", connection: "socketcan:can0", bitrate: 500_000, heartbeat_node: 126, ranges: [] }],
   stations: [
     {
       slug: "blade-1",
       name: "blade 1",
       blade: 1,
-      devices: [{ slug: "pmm", name: "PMM", description_id: "oat-pmm", bus: "can0", node: 1 }],
+      devices: [
+        {
+          slug: "pmm",
+          name: "PMM",
+          description_id: "oat-pmm",
+          bus: "can0",
+          node: 1,
+          address: "",
+          external_stop: "",
+        },
+      ],
     },
   ],
 });
@@ -53,6 +63,8 @@ describe("a turbine that is edited", () => {
       description_id: "oat-pmc",
       bus: "can1",
       node: 1,
+      address: "",
+      external_stop: "",
     });
     expect(kinds(one, ["wtg-08"])).toEqual([
       "slug taken",
@@ -66,6 +78,8 @@ describe("a turbine that is edited", () => {
       description_id: "oat-pmc",
       bus: "can0",
       node: 1,
+      address: "",
+      external_stop: "",
     });
     expect(kinds(one)).toContain("station.blade-1.device.pmc.node node_taken");
   });

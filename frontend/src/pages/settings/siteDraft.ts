@@ -1,5 +1,6 @@
 /** A turbine that is being edited: what is wrong with it, and how found devices are taken over. Pure. */
 import type { FoundDevice, SiteDevice, SiteStation, SiteTurbine } from "../../api/settings";
+import { allows, busOf, isModbus, mostNodes, rangeOf, serverOf } from "./modbusDraft";
 
 /** What is wrong at one field. `at` names the field as in the site file, below the turbine. */
 export interface Flaw {
@@ -9,9 +10,8 @@ export interface Flaw {
 }
 
 const SLUG = /^[a-z0-9]+(-[a-z0-9]+)*$/;
-const NODES = { first: 1, last: 127 };
 export const DEFAULT_BITRATE = 500_000;
-export const NEW_BUS = { connection: "", bitrate: DEFAULT_BITRATE, heartbeat_node: 126 };
+export const NEW_BUS = { connection: "", bitrate: DEFAULT_BITRATE, heartbeat_node: 126, ranges: [] };
 
 export const stationAt = (station: SiteStation) => `station.${station.slug}`;
 export const deviceAt = (station: SiteStation, device: SiteDevice) =>
@@ -36,6 +36,7 @@ export function flawsOf(turbine: SiteTurbine, others: readonly string[]): Flaw[]
     ),
     ...turbine.stations.flatMap((station) => stationFlaws(turbine, station)),
     ...nodeFlaws(turbine),
+    ...addressFlaws(turbine),
   ];
 }
 
@@ -58,6 +59,18 @@ function busFlaws(turbine: SiteTurbine, bus: SiteTurbine["buses"][number]): Flaw
   return [
     ...slugFlaws(`${at}.name`, bus.name),
     ...(same > 1 ? [flaw(`${at}.name`, "taken", { slug: bus.name })] : []),
+    ...(isModbus(bus) ? rangeFlaws(at, bus.ranges) : adapterFlaws(at, bus)),
+  ];
+}
+
+function rangeFlaws(at: string, ranges: readonly string[]): Flaw[] {
+  if (ranges.length === 0) return [flaw(`${at}.ranges`, "ranges_empty")];
+  const wrong = ranges.find((text) => rangeOf(text) === null);
+  return wrong === undefined ? [] : [flaw(`${at}.ranges`, "ranges", { range: wrong })];
+}
+
+function adapterFlaws(at: string, bus: SiteTurbine["buses"][number]): Flaw[] {
+  return [
     ...(/^\w+:.+/.test(bus.connection) ? [] : [flaw(`${at}.connection`, "connection")]),
     ...(Number.isInteger(bus.bitrate) && bus.bitrate >= 0 && bus.bitrate <= 1_000_000
       ? []
@@ -95,13 +108,33 @@ function nodeFlaws(turbine: SiteTurbine): Flaw[] {
   return turbine.stations.flatMap((station) =>
     station.devices.flatMap((device) => {
       const at = `${deviceAt(station, device)}.node`;
-      if (!Number.isInteger(device.node) || device.node < NODES.first || device.node > NODES.last) {
-        return [flaw(at, "node", NODES)];
+      const last = mostNodes(busOf(turbine, device.bus));
+      if (!Number.isInteger(device.node) || device.node < 1 || device.node > last) {
+        return [flaw(at, "node", { first: 1, last })];
       }
       const place = `${device.bus} ${device.node}`;
       const other = seen.get(place);
       seen.set(place, `${station.slug}/${device.slug}`);
       return other === undefined ? [] : [flaw(at, "node_taken", { node: device.node, other })];
+    }),
+  );
+}
+
+/** Each device of Modbus TCP has an address that its bus allows, and no other has it. */
+function addressFlaws(turbine: SiteTurbine): Flaw[] {
+  const seen = new Map<string, string>();
+  return turbine.stations.flatMap((station) =>
+    station.devices.flatMap((device) => {
+      const bus = busOf(turbine, device.bus);
+      if (bus === undefined || !isModbus(bus)) return [];
+      const at = `${deviceAt(station, device)}.address`;
+      const server = serverOf(device.address);
+      if (server === null) return [flaw(at, "address")];
+      if (!allows(bus.ranges, server)) return [flaw(at, "address_outside", { bus: bus.name })];
+      const place = `${server.host} ${String(server.port)}`;
+      const other = seen.get(place);
+      seen.set(place, `${station.slug}/${device.slug}`);
+      return other === undefined ? [] : [flaw(at, "address_taken", { other })];
     }),
   );
 }
@@ -132,13 +165,21 @@ export function takeOver(turbine: SiteTurbine, bus: string, taken: readonly Take
       description_id: one.description_id,
       bus,
       node: one.found.node,
+      address: "",
+      external_stop: "",
     };
-    const at = stations.findIndex((station) => station.slug === one.station);
-    const station = stations[at] ?? newStation(one.station);
-    if (station.devices.some((known) => known.slug === device.slug)) continue;
-    const filled = { ...station, devices: [...station.devices, device] };
-    stations = at < 0 ? [...stations, filled] : stations.with(at, filled);
+    stations = withDevice({ ...turbine, stations }, one.station, device).stations;
   }
+  return { ...turbine, stations };
+}
+
+/** The turbine with one more device; nothing happens where one of that name stands at the station. */
+export function withDevice(turbine: SiteTurbine, slug: string, device: SiteDevice): SiteTurbine {
+  const at = turbine.stations.findIndex((station) => station.slug === slug);
+  const station = turbine.stations[at] ?? newStation(slug);
+  const there = station.devices.some((known) => known.slug === device.slug);
+  const filled = there ? station : { ...station, devices: [...station.devices, device] };
+  const stations = at < 0 ? [...turbine.stations, filled] : turbine.stations.with(at, filled);
   return { ...turbine, stations: [...stations].sort(byBlade) };
 }
 

@@ -65,8 +65,8 @@ export function CheckMove({ pmc }: { pmc: DeviceContext }) {
       <h2>{t("page.setup.gear.check")}</h2>
       <p>{t("page.setup.gear.check_explain", { degrees: MOVE_DEG, speed: SPEED_DPS })}</p>
       <div className={classes.steps}>
-        <ControlSection />
-        <Interlocks device={device} />
+        <ControlSection device={device} />
+        <Interlocks device={device} title={t("page.motion.interlocks")} />
         <PrepareSection device={device} />
         <section aria-label={t("page.setup.gear.check_run")}>
           <h3>{t("page.setup.gear.check_run")}</h3>

@@ -1,0 +1,131 @@
+"""What is known of one slave from the line: its state, its PKW jobs, and the meaning of what it exchanges."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any, Final
+
+from app.model.description import Bus, Description
+from app.wire.frame import Direction
+from app.wire.profibus import pkw
+from app.wire.profibus.pkw import AskKind, ReplyKind
+from app.wire.profibus.pkw_follower import Ended, PkwFollower
+from app.wire.profibus.pzd import First, Order, decode_pzd
+from app.wire.profibus.telegrams import TELEGRAM_TYPES, TelegramType, Words
+from app.wire.records import (
+    Outcome,
+    Protocol,
+    Record,
+    SaveSeen,
+    SdoAccess,
+    SdoSeen,
+    Side,
+    SlaveSeen,
+    SlaveState,
+    Source,
+    ValueSeen,
+)
+
+LOST_AFTER: Final = 3
+"""Requests in a row without an answer; a master repeats each of them once or more."""
+_BY_SIZE: Final = {(one.output_size, one.input_size): one for one in TELEGRAM_TYPES.values()}
+"""No two telegrams exchange as many bytes both ways."""
+
+
+class Slave:
+    """The slave at ``node``. Its data have a meaning where its description is known."""
+
+    def __init__(self, bus: str, node: int) -> None:
+        self.bus = bus
+        self.node = node
+        self.state: SlaveState | None = None
+        self.description: Description | None = None
+        self.order: Order | None = None
+        """That of its process data; None while nobody has proven it, and then they tell nothing."""
+        self._missed = 0
+        self._pkw = PkwFollower()
+
+    def answered(self, t_ns: int, state: SlaveState | None) -> list[Record]:
+        """It said something, which shows it in ``state`` (None: whatever it was, it is there)."""
+        self._missed = 0
+        if state is None:
+            state = self.state if self.state not in (None, SlaveState.ABSENT) else SlaveState.PRESENT
+        return self._become(t_ns, state)
+
+    def missed(self, t_ns: int) -> list[Record]:
+        """It left a request without an answer. One that never gave any is not told."""
+        self._missed += 1
+        if self._missed < LOST_AFTER or self.state in (None, SlaveState.ABSENT):
+            return []
+        return [*self.forget(t_ns), *self._become(t_ns, SlaveState.ABSENT)]
+
+    def exchanged(self, t_ns: int, outputs: bytes, inputs: bytes, client: Direction, base: int) -> list[Record]:
+        """One Data_Exchange, with the inputs at ``base`` of their telegram. Raises FormatError on no PKW."""
+        telegram = _BY_SIZE.get((len(outputs), len(inputs)))
+        if telegram is None or self.description is None or self.description.bus is not Bus.PROFIBUS_DP:
+            return []
+        records = self._process_data(t_ns, telegram, outputs, inputs)
+        if telegram.has_pkw:
+            for ended in self._pkw.exchange(t_ns, outputs[: pkw.SIZE], inputs[: pkw.SIZE], client, base):
+                records += self._told(t_ns, ended)
+        return records
+
+    def forget(self, t_ns: int) -> list[Record]:
+        """It is gone, or frames are missing: what is open will not be answered."""
+        return [record for ended in self._pkw.forget() for record in self._told(t_ns, ended)]
+
+    def _become(self, t_ns: int, state: SlaveState | None) -> list[Record]:
+        if state is None or state is self.state:
+            return []
+        self.state = state
+        return [SlaveSeen(t_ns, self.bus, self.node, state)]
+
+    def _process_data(self, t_ns: int, telegram: TelegramType, outputs: bytes, inputs: bytes) -> list[Record]:
+        head = pkw.SIZE if telegram.has_pkw else 0
+        return [
+            *self._values(t_ns, telegram.received, outputs[head:], Source.PDO_RX),
+            *self._values(t_ns, telegram.sent, inputs[head:], Source.PDO_TX),
+        ]
+
+    def _values(self, t_ns: int, words: Words, data: bytes, source: Source) -> Iterator[Record]:
+        if self.order is None or self.description is None:
+            return
+        for signal, value in decode_pzd(words, data, self.order).items():
+            entry = None if signal.address is None else self.description.entries.get(signal.address)
+            if entry is not None and entry.type.size is not None:
+                raw = value.to_bytes(entry.type.size, "little", signed=signal.signed)
+                yield ValueSeen(t_ns, self.bus, self.node, entry.address, raw, source)
+
+    def _told(self, t_ns: int, ended: Ended) -> Iterator[Record]:
+        job, answer = ended.job, ended.answer
+        address, written = job.request.address, job.request.data
+        is_read = job.request.kind is AskKind.READ
+        refused = answer is not None and answer.kind is ReplyKind.REFUSED
+        outcome = Outcome.LOST if answer is None else Outcome.ABORTED if refused else Outcome.DONE
+        data = None if answer is None else answer.data if is_read else written
+        if not ended.again:
+            yield SdoSeen(
+                t_ns, self.bus, self.node, SdoAccess.READ if is_read else SdoAccess.WRITE, address, outcome,
+                data if outcome is Outcome.DONE else None, answer.value if answer is not None and refused else None,
+                Side.SERVER if refused else None, Protocol.PKW, t_ns - job.t_ns, job.client,
+            )  # fmt: skip
+        if outcome is Outcome.DONE and data is not None:
+            source = Source.SDO_READ if is_read else Source.SDO_WRITE
+            yield ValueSeen(t_ns, self.bus, self.node, address, data, source)
+        saves = () if self.description is None else self.description.save
+        if not is_read and any((one.address, one.signature) == (address, job.request.value) for one in saves):
+            yield SaveSeen(t_ns, self.bus, self.node, address, outcome is Outcome.DONE)
+
+    def snapshot(self) -> dict[str, Any]:
+        """JSON-able. The description is not in it."""
+        state = None if self.state is None else self.state.value
+        order = None if self.order is None else [self.order.byte.value, self.order.word.value]
+        return {"state": state, "order": order, "missed": self._missed, "pkw": self._pkw.snapshot()}
+
+    def restore(self, kept: Mapping[str, Any]) -> None:
+        """Go on from ``snapshot()``. Raises KeyError or ValueError on another state."""
+        self.state = None if kept["state"] is None else SlaveState(kept["state"])
+        order = kept["order"]
+        self.order = None if order is None else Order(First(order[0]), First(order[1]))
+        self._missed = kept["missed"]
+        self._pkw.restore(kept["pkw"])

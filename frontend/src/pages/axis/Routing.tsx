@@ -1,0 +1,64 @@
+import { useDeviceVersion } from "../../live/live";
+import type { DeviceContext } from "../../model/shown";
+import { useTexts } from "../../texts/texts";
+import { ReadingText } from "../../ui/ReadingText";
+import { entriesOf } from "../../ui/reading";
+import { Fact } from "../overview/BladeFacts";
+import overview from "../overview/Overview.module.css";
+import classes from "./Axis.module.css";
+
+const INPUTS = "3242";
+const OUTPUTS = "3252";
+/** The first bit of 60FDh that a routing feeds stands in sub-index 1. */
+const FIRST = 1;
+
+/** From where the bits of the inputs and the outputs come, where the drive routes them. */
+export function Routing({ context }: { context: DeviceContext | null }) {
+  const t = useTexts();
+  useDeviceVersion(context?.slug ?? "");
+  if (context === null) return null;
+  return (
+    <>
+      <Table
+        context={context}
+        index={INPUTS}
+        title={t("page.axis.routing_in")}
+        nameOf={(sub) => t("page.axis.routing_bit", { bit: sub - FIRST })}
+      />
+      <Table
+        context={context}
+        index={OUTPUTS}
+        title={t("page.axis.routing_out")}
+        nameOf={(sub) => t("page.axis.routing_output", { output: sub })}
+      />
+    </>
+  );
+}
+
+interface TableProps {
+  context: DeviceContext;
+  index: string;
+  title: string;
+  nameOf: (sub: number) => string;
+}
+
+/** What is fed by something; a place that is always 0 says nothing. */
+function Table({ context, index, title, nameOf }: TableProps) {
+  const entries = [...entriesOf(context.doc).keys()].filter(
+    (address) => address.startsWith(`${index}:`) && address !== `${index}:00`,
+  );
+  if (entries.length === 0) return null;
+  const fed = entries.filter((address) => context.lookup(address) !== 0);
+  return (
+    <section className={classes.panel} aria-label={title} data-testid={`routing-${index}`}>
+      <h2>{title}</h2>
+      <dl className={overview.facts}>
+        {fed.map((address) => (
+          <Fact key={address} name={nameOf(parseInt(address.slice(-2), 16))}>
+            <ReadingText context={context} address={address} pace="kept" />
+          </Fact>
+        ))}
+      </dl>
+    </section>
+  );
+}
