@@ -73,8 +73,8 @@ _COMPLAINTS: Final = ((STATUSWORD, 1 << 7, 1 << 3), (Address(0x3000), 1 << 1, 1 
 class NodeLine:
     """One device as network management sees it. ``silent``: its heartbeat is overdue, so its state is unknown.
 
-    Not ``managed``: its bus has neither states nor heartbeats; then ``answered_t_ns``, the latest answer that it gave to
-    anybody, tells that it is there.
+    Not ``managed``: its bus has neither states nor heartbeats; then ``answered_t_ns``, the latest answer that it gave
+    to anybody, tells that it is there.
     """
 
     device: str
@@ -235,7 +235,7 @@ def axis_lines(turbine: Turbine, targets: Mapping[str, Target], now_ns: int) -> 
 def _axis_line(station: Station, blade: int, devices: list[Target], now_ns: int) -> AxisLine:
     position = _latest(devices, _POSITION)
     state = next((axis_state(raw) for raw in _lookups(devices, STATUSWORD) if isinstance(raw, int)), None)
-    faults, code = _faults(devices)
+    faults, code = fault_lines(devices)
     stale = position is None or position.stale or now_ns - position.t_ns > STALE_NS
     return AxisLine(
         station=station.slug,
@@ -254,11 +254,12 @@ def _axis_line(station: Station, blade: int, devices: list[Target], now_ns: int)
         battery_v=_number(_latest(devices, _BATTERY)),
         dc_link_v=_number(_latest(devices, _DC_LINK)),
         stale=stale,
-        look="unknown" if position is None else "stale" if stale else _look(state, faults),
+        look="unknown" if position is None else "stale" if stale else look_of(state, faults),
     )
 
 
-def _look(state: str | None, faults: Iterable[FaultLine]) -> LookName:
+def look_of(state: str | None, faults: Iterable[FaultLine]) -> LookName:
+    """What a picture of an axis shows that is known and not old, the worst first."""
     severities = {fault.severity for fault in faults}
     if state in _FAULT or "error" in severities:
         return "fault"
@@ -310,7 +311,7 @@ def _number(seen: _Seen | None) -> float | None:
     return None if seen is None else seen.number
 
 
-def _faults(devices: Iterable[Target]) -> tuple[tuple[FaultLine, ...], int | None]:
+def fault_lines(devices: Iterable[Target]) -> tuple[tuple[FaultLine, ...], int | None]:
     """What the devices complain of, errors first, and the code of the worst; 0: nothing, None: not known."""
     known: int | None = None
     found = []

@@ -40,9 +40,9 @@ class LiveNode:
     """All that is kept of a node. ``seen``: it has said something itself."""
 
     __slots__ = (
-        "answered_ns", "boot_ns", "boots", "bus", "commanded", "emcy_code", "emcy_ns", "first_interval_ns", "heartbeat_ns",
-        "interval_ns", "memory", "number", "other_client_ns", "period_ns", "reset_communication", "seen", "silent",
-        "state", "version",
+        "answered_ns", "boot_ns", "boots", "bus", "commanded", "emcy_code", "emcy_ns", "first_interval_ns",
+        "heartbeat_ns", "interval_ns", "memory", "number", "other_client_ns", "period_ns", "reset_communication",
+        "seen", "silent", "state", "version",
     )  # fmt: skip
 
     def __init__(self, bus: str, number: int) -> None:
@@ -81,8 +81,8 @@ class LiveNode:
         """What a reader gets."""
         return NodeView(
             self.bus, self.number, self.state, self.commanded, self.heartbeat_ns, self.period_ns or self.interval_ns,
-            self.silent, self.boot_ns, self.boots, self.emcy_code, self.emcy_ns, self.other_client_ns, self.answered_ns,
-            self.version,
+            self.silent, self.boot_ns, self.boots, self.emcy_code, self.emcy_ns, self.other_client_ns,
+            self.answered_ns, self.version,
         )  # fmt: skip
 
     def snapshot(self) -> dict[str, Any]:

@@ -52,8 +52,13 @@ function Table({ context, index, title, nameOf }: TableProps) {
   if (entries.length === 0) return null;
   const fed = entries.filter((address) => context.lookup(address) !== 0);
   return (
-    <section className={classes.panel} aria-label={title} data-testid={`routing-${index}`}>
+    <section
+      className={`${classes.panel} ${classes.plots}`}
+      aria-label={title}
+      data-testid={`routing-${index}`}
+    >
       <h2>{title}</h2>
+      {fed.length === 0 && <p className="dim">{t("page.axis.routing_none")}</p>}
       <dl className={overview.facts}>
         {fed.map((address) => (
           <Fact key={address} name={nameOf(parseInt(address.slice(-2), 16))}>
