@@ -69,8 +69,9 @@ export function useLendStop(stop: StopRequest): void {
 
 /** While anything can move, Esc is STOP and nothing else. Taken in the capture phase, before any dialog sees it. */
 export function stopOnEscape(event: KeyboardEvent): void {
-  if (event.key !== "Escape" || liveStore.link?.state !== "connected" || !mayMove(liveStore.axes.values()))
-    return;
+  // An axis that is no blade has no line of its own there: the desk tells that it is commanded.
+  const moving = mayMove(liveStore.axes.values()) || liveStore.motion?.running != null;
+  if (event.key !== "Escape" || liveStore.link?.state !== "connected" || !moving) return;
   event.preventDefault();
   event.stopImmediatePropagation();
   if (!event.repeat) stopNow?.();
