@@ -183,6 +183,7 @@ async def test_a_frame_that_the_adapter_does_not_take_keeps_nothing_from_stoppin
         await out_of_feather(connection, desk, page)
         control = desk.prepared[AXIS].control
         send = control._send
+        assert send is not None
         moving = asyncio.create_task(jog(desk, AXIS, page.fence, -4.0, connection.journal))
         start_deg = await angle_deg(connection)
         async with asyncio.timeout(10.0):
