@@ -7174,8 +7174,8 @@ export interface components {
          * NodeLine
          * @description One device as network management sees it. ``silent``: its heartbeat is overdue, so its state is unknown.
          *
-         *     Not ``managed``: its bus has neither states nor heartbeats; then ``answered_t_ns``, the latest answer that it gave to
-         *     anybody, tells that it is there.
+         *     Not ``managed``: its bus has neither states nor heartbeats; then ``answered_t_ns``, the latest answer that it gave
+         *     to anybody, tells that it is there.
          */
         NodeLine: {
             /** Answered T Ns */
