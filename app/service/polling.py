@@ -60,6 +60,8 @@ TORQUE: Final = parse_address("6077")
 """What stands in for the current on a drive that gives none (CiA 402, torque actual value)."""
 CONDITIONS: Final = tuple(map(parse_address, ("4014:01", "4014:03", "4014:04")))
 """Supply and temperatures of a drive that has no objects of the profile for them."""
+AXIS_ROOM: Final = tuple(map(parse_address, ("6062", "60FE:01", "4014:02")))
+"""What the axis room shows of such a drive besides: its demand, its outputs, the supply of its logic."""
 SI_UNIT: Final = parse_address("60A8")
 UNITS: Final = tuple(map(parse_address, ("60A8", "60A9", "6091:01", "6091:02", "6092:01", "6092:02")))
 """Where a device chooses its units, no value says anything without these: they must be known again after a restart."""
@@ -87,6 +89,7 @@ def usual_list(description: Description) -> PollList:
     wanted = dict(_USUAL)
     if CURRENT not in description.entries:
         wanted |= dict.fromkeys((TORQUE, *CONDITIONS), Rate.SLOW)
+        wanted |= dict.fromkeys(AXIS_ROOM, Rate.SLOW)
     if SI_UNIT in description.entries:
         wanted |= dict.fromkeys(UNITS, Rate.RARE)
     return {address: rate for address, rate in wanted.items() if address in description.entries}

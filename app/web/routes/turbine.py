@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable
 from typing import Any
 
 from fastapi import APIRouter
 
 from app.model.od_export import description_dict
 from app.model.roles import Role
-from app.model.site import Turbine as SiteTurbine
-from app.service.devices import Target
 from app.service.shown import LiveShown, Shown
+from app.service.stage import Stage
 from app.service.stop import is_axis
 from app.web.deps import BenchOf, PersonOf, ShownOf, StageOf, needs, reads_both
 from app.web.models import BusRef, ConnectRequest, DeviceRef, KnownTurbine, Nothing, StationRef, Turbine
@@ -38,8 +36,7 @@ async def connect(bench: BenchOf, person: PersonOf, request: ConnectRequest) -> 
     if request.turbine not in bench.sites.turbines:
         raise NotFoundError(what=request.turbine)
     await bench.connect(request.turbine, person.person)
-    connection = bench.require()
-    return _turbine(LiveShown(bench), connection.turbine, _axes(connection.targets))
+    return _turbine(LiveShown(bench), bench.require())
 
 
 @router.post("/live/disconnect", dependencies=[needs(Role.TECHNICIAN)])
@@ -58,16 +55,11 @@ async def consent(bench: BenchOf, person: PersonOf, _request: Nothing) -> Nothin
 
 async def turbine(shown: ShownOf) -> Turbine | None:
     """The turbine that is shown, with its stations and devices; null where none is connected."""
-    if shown.stage is None:
-        return None
-    return _turbine(shown, shown.stage.turbine, _axes(shown.stage.targets))
+    return None if shown.stage is None else _turbine(shown, shown.stage)
 
 
-def _axes(targets: Iterable[Target]) -> set[str]:
-    return {target.slug for target in targets if is_axis(target)}
-
-
-def _turbine(shown: Shown, site: SiteTurbine, axes: Container[str]) -> Turbine:
+def _turbine(shown: Shown, stage: Stage) -> Turbine:
+    site, axes = stage.turbine, {target.slug for target in stage.targets if is_axis(target)}
     link = shown.link()
     adapter = next((bus.connection for bus in site.buses if bus.name == link.bus), "")
     stations = [

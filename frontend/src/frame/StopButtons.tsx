@@ -2,7 +2,7 @@ import { Tooltip } from "@mantine/core";
 import { useQueries, useQuery } from "@tanstack/react-query";
 import { descriptionQuery, turbineQuery } from "../api/queries";
 import { IconHandStop, IconWind } from "@tabler/icons-react";
-import { useAxes, useHearing, useLink } from "../live/live";
+import { useAxes, useHearing, useLink, useMotion } from "../live/live";
 import { useTexts } from "../texts/texts";
 import classes from "./Frame.module.css";
 import { mayMove } from "../live/axis";
@@ -16,7 +16,8 @@ export function StopButtons() {
   const t = useTexts();
   const link = useLink();
   const deaf = useHearing().state === "deaf";
-  const moving = mayMove(useAxes().values());
+  const commanded = useMotion()?.running != null;
+  const moving = mayMove(useAxes().values()) || commanded;
   const stop = useHalt(Halt.Stop);
   const feather = useHalt(Halt.Feather);
   const turbine = useQuery(turbineQuery).data?.name;

@@ -1,5 +1,5 @@
 import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
-import type { AxisData, LinkData } from "../api/types";
+import type { AxisData, LinkData, MotionData } from "../api/types";
 import { liveStore } from "../live/live";
 import { lendStop, stopOnEscape } from "./stop";
 
@@ -74,6 +74,15 @@ describe("Esc", () => {
     tell("state.ready_to_switch_on", "connected", true);
     expect(press("Escape")).toBe(true);
     expect(stops).toBe(1);
+  });
+
+  it("is STOP while the desk commands an axis that is no blade", () => {
+    tell("state.ready_to_switch_on");
+    const line = { available: true, prepared: [], left: [] } as unknown as MotionData;
+    liveStore.takeMotion({ ...line, running: { device: "bench/servo", doing: "jog" } });
+    expect(press("Escape")).toBe(true);
+    liveStore.takeMotion({ ...line, running: null });
+    expect(press("Escape")).toBe(false);
   });
 
   it("is left to dialogs and menus while all axes are at rest, and where nothing is connected", () => {

@@ -69,9 +69,11 @@ export function useLendStop(stop: StopRequest): void {
 
 /** True unless it is known that nothing can move: a lost bus need not be the only one, and who is deaf knows nothing. */
 function anythingMayMove(): boolean {
-  const link = liveStore.link;
-  if (!link || link.state === "disconnected" || liveStore.axes.size === 0) return false;
-  return link.state === "lost" || liveStore.hearing.state === "deaf" || mayMove(liveStore.axes.values());
+  const { link, motion, axes, hearing } = liveStore;
+  if (!link || link.state === "disconnected") return false;
+  if (motion?.running) return true;
+  if (link.state === "lost" || hearing.state === "deaf") return axes.size > 0 || motion?.available === true;
+  return mayMove(axes.values());
 }
 
 /** While anything can move, Esc is STOP and nothing else. Taken in the capture phase, before any dialog sees it. */

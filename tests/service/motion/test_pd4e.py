@@ -117,7 +117,7 @@ async def test_a_jog_moves_while_it_is_held_and_the_mode_comes_back(bench: Bench
         assert bench.witness(MODE, size=1) == 3
         await desk.put_back(AXIS, page.fence)
         assert bench.witness(MODE, size=1) == 0, "it had none"
-        assert desk.left.devices == ()
+        assert not desk.left.devices
 
 
 async def test_a_move_reaches_its_target_in_the_units_of_the_drive(bench: Bench, connection: Connection) -> None:

@@ -109,18 +109,22 @@ function Axis({ station }: { station: StationRef }) {
         pace="slow"
       />
       <Routing context={contexts.pmc} />
-      <BitPanel
-        title={t("page.axis.inputs", { device: "PMM" })}
-        context={contexts.pmm}
-        address="30FD"
-        pace="slow"
-      />
-      <BitPanel
-        title={t("page.axis.outputs", { device: "PMM" })}
-        context={contexts.pmm}
-        address="30FE:03"
-        pace="slow"
-      />
+      {pmm && (
+        <>
+          <BitPanel
+            title={t("page.axis.inputs", { device: "PMM" })}
+            context={contexts.pmm}
+            address="30FD"
+            pace="slow"
+          />
+          <BitPanel
+            title={t("page.axis.outputs", { device: "PMM" })}
+            context={contexts.pmm}
+            address="30FE:03"
+            pace="slow"
+          />
+        </>
+      )}
       <ErrorHistory device={drive} context={contexts.pmc} partner={contexts.pmm} faults={faults} />
       <ErrorHistory device={pmm} context={contexts.pmm} partner={contexts.pmc} faults={faults} />
     </div>

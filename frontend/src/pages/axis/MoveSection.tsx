@@ -20,10 +20,9 @@ import { Preview } from "./Preview";
 const MOST_DPS = 5;
 const USUAL_DPS = 2;
 const USUAL_DEG = 85;
-/** Elsewhere what the drive itself holds bounds the speed, and a tenth of its usual one is begun with. */
+/** Elsewhere what the drive itself holds bounds the speed, and a small part of that is begun with. */
 const BOUNDS = ["607F", "6080"];
-const PROFILE_SPEED = "6081";
-const OF_PROFILE = 10;
+const OF_MOST = 500;
 
 enum Way {
   Minus = "minus",
@@ -55,8 +54,7 @@ export function MoveSection({ station, device, context }: Props) {
   const now = useAxisNow(station, context);
   const measures = measuresOf(context);
   const most = blade ? MOST_DPS : mostOf(context);
-  const profile = context && scaledAt(context, PROFILE_SPEED);
-  const usual = blade ? USUAL_DPS : profile ? Math.max(1, Math.round(profile / OF_PROFILE)) : 1;
+  const usual = blade ? USUAL_DPS : Math.max(1, Math.round((most ?? 0) / OF_MOST));
   const speed = typedSpeed ?? usual;
   const degrees = measures.position.unit === "°";
   const suffix = degrees ? "°" : ` ${measures.position.unit}`;

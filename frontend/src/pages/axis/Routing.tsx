@@ -1,6 +1,7 @@
 import { useDeviceVersion } from "../../live/live";
+import { fieldOf } from "../../model/bits";
 import type { DeviceContext } from "../../model/shown";
-import { useTexts } from "../../texts/texts";
+import { type Translate, useTexts } from "../../texts/texts";
 import { ReadingText } from "../../ui/ReadingText";
 import { entriesOf } from "../../ui/reading";
 import { Fact } from "../overview/BladeFacts";
@@ -44,21 +45,40 @@ interface TableProps {
 
 /** What is fed by something; a place that is always 0 says nothing. */
 function Table({ context, index, title, nameOf }: TableProps) {
+  const t = useTexts();
   const entries = [...entriesOf(context.doc).keys()].filter(
     (address) => address.startsWith(`${index}:`) && address !== `${index}:00`,
   );
   if (entries.length === 0) return null;
   const fed = entries.filter((address) => context.lookup(address) !== 0);
   return (
-    <section className={classes.panel} aria-label={title} data-testid={`routing-${index}`}>
+    <section
+      className={`${classes.panel} ${classes.plots}`}
+      aria-label={title}
+      data-testid={`routing-${index}`}
+    >
       <h2>{title}</h2>
+      {fed.length === 0 && <p className="dim">{t("page.axis.routing_none")}</p>}
       <dl className={overview.facts}>
         {fed.map((address) => (
           <Fact key={address} name={nameOf(parseInt(address.slice(-2), 16))}>
-            <ReadingText context={context} address={address} pace="kept" />
+            <ReadingText
+              context={context}
+              address={address}
+              pace="kept"
+              instead={(raw) => fieldsOf(context, address, raw, t)}
+            />
           </Fact>
         ))}
       </dl>
     </section>
   );
+}
+
+/** Fields of several bits by their names and values; null where the value has a name of its own. */
+function fieldsOf(context: DeviceContext, address: string, raw: number, t: Translate): string | null {
+  const entry = entriesOf(context.doc).get(address);
+  const bits = entry?.bits ? context.doc.bit_tables[entry.bits] : undefined;
+  if (!entry || !bits) return null;
+  return bits.map((bit) => `${t(bit.text_key)} ${fieldOf(entry, raw, bit)}`).join(" · ");
 }
