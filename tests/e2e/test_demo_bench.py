@@ -133,6 +133,22 @@ def test_the_page_goes_over_to_the_bench(page: Page, bench: Demo) -> None:
 
 
 @pytest.mark.browser
+def test_the_scope_takes_the_signals_of_its_axis(page: Page, bench: Demo) -> None:
+    page.goto(f"{bench.home}axis?tab=scope&scene=off")
+    expect(page.get_by_test_id("turbine")).to_have_text("Bench PD4-E", timeout=WAIT_MS)
+    expect(page.get_by_test_id("axis-tab-scope")).to_be_visible()
+    expect(page.get_by_test_id("axis-tab-pdo")).to_have_count(0)  # its bus has none
+    page.get_by_test_id("preset-motion").click()
+    signals = page.get_by_test_id("chosen-signals").get_by_role("listitem")
+    expect(signals).to_have_count(5)
+    page.get_by_test_id("arm").click()
+    for number in range(5):
+        expect(signals.nth(number)).to_contain_text("polled, about", timeout=WAIT_MS)
+    page.get_by_role("button", name="Trigger now").click()
+    expect(page.get_by_test_id("scope-plot-bits").locator("canvas")).to_be_visible(timeout=WAIT_MS)
+
+
+@pytest.mark.browser
 def test_a_drive_is_asked_and_added_by_its_address(page: Page, bench: Demo) -> None:
     """A bus is made, its range saved; only then the address is asked, and what answered is taken into the turbine."""
     page.goto(f"{bench.home}settings?section=turbines&scene=off")

@@ -7,7 +7,7 @@ import { usePageSearch } from "../../frame/search";
 import { Unconnected } from "../../frame/Unconnected";
 import { useTexts } from "../../texts/texts";
 import { stationName } from "../../ui/devices";
-import { lastOf } from "../../ui/format";
+import { hasAxis, keyOf } from "./stations";
 import room from "../../ui/Room.module.css";
 
 interface Props {
@@ -18,18 +18,13 @@ interface Props {
   benches?: boolean;
 }
 
-const keyOf = (station: StationRef) =>
-  station.blade === null ? lastOf(station.slug) : String(station.blade);
-
 /** The blade that a tab of this room is about, chosen in the strip at its head. */
 export function BladeStrip({ now, children, benches = false }: Props) {
   const t = useTexts();
   const query = useQuery(useTurbineQuery());
   const turbine = query.data;
   const [search, update] = usePageSearch();
-  const stations = (turbine?.stations ?? []).filter(
-    ({ blade, devices }) => blade !== null || (benches && devices.some((one) => one.axis)),
-  );
+  const stations = (turbine?.stations ?? []).filter((one) => one.blade !== null || (benches && hasAxis(one)));
   const station = stations.find((one) => keyOf(one) === search.blade) ?? stations[0];
   if (!turbine) return query.isSuccess ? <Unconnected /> : null;
   if (!station) return <p className={room.note}>{t(benches ? "page.axis.no_axis" : "page.axis.none")}</p>;

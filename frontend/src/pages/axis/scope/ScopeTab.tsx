@@ -9,6 +9,7 @@ import { useTexts } from "../../../texts/texts";
 import { stationName } from "../../../ui/devices";
 import room from "../../../ui/Room.module.css";
 import { useTyped } from "../../../ui/useTyped";
+import { hasAxis, keyOf } from "../stations";
 import { CapturesPanel } from "./CapturesPanel";
 import { CaptureView } from "./CaptureView";
 import { type Draft, draftOf, FIRST } from "./draft";
@@ -33,8 +34,8 @@ export function ScopeTab() {
   const captures = useQuery(capturesQuery).data ?? [];
   const options = useOptions(search.blade);
   const role = useRole();
-  const stations = (turbine?.stations ?? []).filter((one) => one.blade !== null);
-  const station = stations.find((one) => String(one.blade) === search.blade) ?? stations[0];
+  const stations = (turbine?.stations ?? []).filter(hasAxis);
+  const station = stations.find((one) => keyOf(one) === search.blade) ?? stations[0];
   const [text, setText] = useTyped(search.trigger ?? "", (typed) => update({ trigger: typed }));
   const draft = draftOfText(text || undefined, turbine?.slug) ?? (line?.order ? draftOf(line.order) : FIRST);
   const setDraft = (change: Partial<Draft>) =>
@@ -51,10 +52,10 @@ export function ScopeTab() {
         <h1>{t("page.scope.title")}</h1>
         {station && (
           <SegmentedControl
-            value={String(station.blade)}
+            value={keyOf(station)}
             onChange={(blade) => update({ blade })}
-            data={stations.map((one) => ({ value: String(one.blade), label: stationName(one, t) }))}
-            aria-label={t("page.axis.choose")}
+            data={stations.map((one) => ({ value: keyOf(one), label: stationName(one, t) }))}
+            aria-label={t(station.blade === null ? "page.axis.choose_axis" : "page.axis.choose")}
             data-testid="choose-blade"
           />
         )}

@@ -36,7 +36,7 @@ export function SignalsPanel({ options, chosen, rates, station, locked, onChosen
           <Button
             key={preset}
             variant="default"
-            disabled={locked || station === null || options.all.length === 0}
+            disabled={locked || station === null || presetOf(preset, station, options).length === 0}
             onClick={() => station !== null && onChosen(presetOf(preset, station, options))}
             data-testid={`preset-${preset}`}
           >

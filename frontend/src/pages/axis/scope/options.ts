@@ -6,6 +6,7 @@ import type { BitDoc, EntryDoc } from "../../../api/types";
 import type { DeviceContext } from "../../../model/shown";
 import { isFloat, isInteger, quantityOf } from "../../../model/values";
 import { type Translate, useTexts } from "../../../texts/texts";
+import { keyOf } from "../stations";
 import { type Place, placesOf, stationName } from "../../../ui/devices";
 import { useContexts } from "../../parameters/devicesOf";
 
@@ -67,8 +68,10 @@ export function useOptions(blade: string | undefined): Options {
   const places = useMemo(() => placesOf(turbine), [turbine]);
   const contexts = useContexts(places);
   return useMemo(() => {
-    if (places.length === 0 || contexts.size === 0) return NO_OPTIONS;
-    const own = (place: Place) => Number(String(place.station.blade) !== (blade ?? "1"));
+    const first = places[0];
+    if (first === undefined || contexts.size === 0) return NO_OPTIONS;
+    const shown = blade ?? keyOf(first.station);
+    const own = (place: Place) => Number(keyOf(place.station) !== shown);
     const sorted = places.toSorted((a, b) => own(a) - own(b));
     const all = sorted.flatMap((place) => ofDevice(place, contexts.get(place.device.slug), t));
     all.sort((a, b) => rank(a) - rank(b));
@@ -161,5 +164,15 @@ export function found(options: readonly SignalOption[], words: string): SignalOp
 
 /** The signals of a preset at a station, as far as its devices have them. */
 export function presetOf(preset: Preset, station: string, options: Options): string[] {
-  return PRESETS[preset].map((end) => `${station}/${end}`).filter((name) => options.byName.has(name));
+  const here = new Set(
+    options.all.filter(({ device }) => device.startsWith(`${station}/`)).map((one) => one.device),
+  );
+  return PRESETS[preset]
+    .flatMap((end) => {
+      const [device, signal] = end.split("/");
+      const named = `${station}/${device}`;
+      // A station with other devices than those of a blade: whichever has the object.
+      return here.has(named) ? [`${named}/${signal}`] : [...here].map((one) => `${one}/${signal}`);
+    })
+    .filter((name) => options.byName.has(name));
 }
