@@ -16,6 +16,7 @@ const MOTION: readonly { key: string; address: string; pace: Pace }[] = [
   { key: "following_error", address: "60F4", pace: "slow" },
   { key: "blade_encoder", address: "6864", pace: "rare" },
   { key: "velocity", address: "606C", pace: "fast" },
+  { key: "target_velocity", address: "60FF", pace: "kept" },
   { key: "current", address: "6078", pace: "slow" },
   { key: "torque", address: "6077", pace: "slow" },
   { key: "dc_link", address: "6079", pace: "slow" },
