@@ -18,7 +18,9 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser = commands.add_parser("replay", help="serve the page on recordings: time line, plots, 3D, what came first")
     parser.add_argument("recording", nargs="+", type=Path, help="MCAP files; the first one is opened")
     add_port(parser)
-    parser.set_defaults(run=_replay, site=None, can=None, turbine=None, eds=[], consent=False, listen_s=0.5)
+    parser.set_defaults(
+        run=_replay, site=None, can=None, modbus=None, turbine=None, eds=[], consent=False, listen_s=0.5
+    )
     parser.set_defaults(no_record=True, listen=None, tls_cert=None, tls_key=None, host=[], instructor=None)
 
 

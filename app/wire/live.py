@@ -31,6 +31,7 @@ from app.wire.records import (
     NmtCommandSeen,
     OrphanSeen,
     Outcome,
+    Protocol,
     Record,
     RestartSeen,
     SaveSeen,
@@ -54,6 +55,8 @@ HEARTBEAT_PRODUCER: Final = Address(0x1017)
 SILENT_FACTOR: Final = 1.5
 """A node is silent after so many heartbeat periods."""
 SILENT_MARGIN_NS: Final = 100_000_000
+_WITHOUT_HEARTBEATS: Final = (Protocol.OBJECT, Protocol.FRAMES, Protocol.REGISTERS)
+"""What is spoken where only an answer tells that a device is there."""
 SNAPSHOT_VERSION: Final = 1
 _SNAPSHOT_EVENTS: Final = 200
 
@@ -281,7 +284,8 @@ class LiveState:
     def _on_sdo(self, seen: SdoSeen) -> None:
         node = self._node(seen.bus, seen.node)
         if seen.outcome is Outcome.DONE or seen.aborted_by is Side.SERVER:
-            node.answered_ns = seen.t_ns
+            if seen.protocol in _WITHOUT_HEARTBEATS:
+                node.answered_ns = seen.t_ns
             self._see(node)
         if seen.client is Direction.RX and node.seen:
             node.other_client_ns = seen.t_ns

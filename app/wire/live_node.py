@@ -17,7 +17,7 @@ class NodeView:
     ``heartbeat_ns`` and ``boot_ns`` are the times of the latest heartbeat and boot-up. ``period_ns`` is that of 1017h
     where known, else the longest interval measured. ``silent``: a heartbeat is overdue. ``emcy_code`` is
     that of the latest emergency message, 0 after "no error". ``other_client_ns``: the latest transfer of a foreign
-    SDO client. ``answered_ns``: the latest answer to a request, ours or another's, a refusal included.
+    SDO client. ``answered_ns``: on a bus without heartbeats the latest answer to anybody, a refusal included.
     """
 
     bus: str

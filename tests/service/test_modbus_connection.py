@@ -46,7 +46,8 @@ async def test_what_is_polled_is_seen_live_and_the_same_in_a_replay(tmp_path: Pa
             assert 0 < load < 0.05, "of 100 Mbit/s"
             live = {address: view.reading for address, view in connection.live.values(BUS, peer.node).items()}
             (file,) = connection.recorded_files()
-    frames = list(open_recording(file).frames())
+    with open_recording(file) as recording:
+        frames = list(recording.frames())
     assert {type(frame.payload) for frame in frames} == {Adu}
     assert {frame.direction for frame in frames} == {Direction.RX, Direction.TX}
     source = Source(file, {})
@@ -55,9 +56,9 @@ async def test_what_is_polled_is_seen_live_and_the_same_in_a_replay(tmp_path: Pa
         stage.advance(source.to_ns, lambda: False)
         assert {at: view.reading for at, view in stage.live.values(BUS, peer.node).items()} == live
         assert stage.targets[0].lookup(STATUSWORD) == target.lookup(STATUSWORD)
-        with build_index(file, source.descriptions) as index:
+        with build_index(file, source.descriptions) as index, open_recording(file) as recording:
             assert index.servers == {(BUS, peer.node): peer.server}
-            course = course_at(index, open_recording(file), source.descriptions, source.to_ns)
+            course = course_at(index, recording, source.descriptions, source.to_ns)
             state = course.snapshot()
             again = Course((), source.descriptions)
             again.restore(state)
