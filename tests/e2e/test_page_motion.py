@@ -203,53 +203,6 @@ def test_a_tab_that_is_killed_stops_its_blade(context: BrowserContext, demo: str
     other.close()
 
 
-def moving(page: Page) -> None:
-    """A jog that is held and under way."""
-    start = stands_still(page)
-    press(page, "jog-minus")
-    page.wait_for_function(
-        "from => parseFloat(document.querySelector('[data-testid=axis-angle]').textContent) < from - 1", arg=start
-    )
-
-
-def stopped(page: Page) -> None:
-    """Somebody has pressed STOP: what is held does not move on."""
-    expect(page.get_by_test_id("motion-ended")).to_contain_text("stopped by the drive, or by STOP", timeout=MOVE_MS)
-    before = stands_still(page)
-    page.mouse.up()
-    assert abs(stands_still(page) - before) < 0.1
-
-
-def test_escape_and_the_button_stop_a_blade_that_moves_also_from_inside_the_3d_view(
-    context: BrowserContext, demo: str
-) -> None:
-    page, other = axis_page(context, demo, 3), context.new_page()
-    other.goto(demo.split("?")[0])
-    canvas = other.frame_locator("iframe").locator("canvas").first
-    expect(canvas).to_be_visible(timeout=MOVE_MS)
-    take_control(page)
-    prepare(page)
-
-    moving(page)
-    canvas.click(position={"x": 5, "y": 5})
-    assert other.evaluate("document.activeElement.tagName") == "IFRAME"
-    other.keyboard.press("Escape")
-    stopped(page)
-
-    moving(page)
-    other.locator("body").press("Escape")
-    stopped(page)
-
-    moving(page)
-    other.get_by_test_id("stop").click()
-    stopped(page)
-    other.close()
-    page.get_by_test_id("put-back").click()
-    expect(page.get_by_test_id("prepare")).to_be_visible()
-    give_back(page)
-    page.close()
-
-
 def home_at(page: Page, angle_deg: str) -> None:
     """Type the angle and hold the button long enough."""
     page.get_by_test_id("home-angle").fill(angle_deg)

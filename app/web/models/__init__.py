@@ -89,11 +89,12 @@ class Turbine(BaseModel):
 
 
 class KnownTurbine(BaseModel):
-    """A turbine of the site file; ``buses`` are the adapters that it is reached by."""
+    """A turbine of the site file; ``buses`` are the adapters that it is reached by, ``blades`` how many it has."""
 
     slug: str
     name: str
     buses: list[str]
+    blades: int
     connected: bool
 
 

@@ -24,7 +24,11 @@ async def turbines(bench: BenchOf) -> list[KnownTurbine]:
     connected = None if bench.connection is None else bench.connection.turbine.slug
     return [
         KnownTurbine(
-            slug=one.slug, name=one.name, buses=[bus.connection for bus in one.buses], connected=slug == connected
+            slug=one.slug,
+            name=one.name,
+            buses=[bus.connection for bus in one.buses],
+            blades=sum(station.blade is not None for station in one.stations),
+            connected=slug == connected,
         )
         for slug, one in bench.sites.turbines.items()
     ]

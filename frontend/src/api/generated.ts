@@ -6424,9 +6424,11 @@ export interface components {
         KeyKind: "trip" | "error" | "warning";
         /**
          * KnownTurbine
-         * @description A turbine of the site file; ``buses`` are the adapters that it is reached by.
+         * @description A turbine of the site file; ``buses`` are the adapters that it is reached by, ``blades`` how many it has.
          */
         KnownTurbine: {
+            /** Blades */
+            blades: number;
             /** Buses */
             buses: string[];
             /** Connected */

@@ -33,7 +33,9 @@ export function useParity(): Parity {
   const [search] = usePageSearch();
   const here = useQuery(turbineQuery);
   const known = useQuery(knownTurbinesQuery);
-  const turbines = known.data ?? [];
+  const turbines = (known.data ?? []).filter(
+    ({ slug, blades }) => blades >= LEAST_COLUMNS || slug === (search.turbine ?? here.data?.slug),
+  );
   const turbine =
     search.turbine ?? here.data?.slug ?? (turbines.length === 1 ? turbines[0]?.slug : undefined);
   const connected = turbine !== undefined && turbine === here.data?.slug;
