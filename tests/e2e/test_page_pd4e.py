@@ -116,7 +116,10 @@ def test_a_drive_is_prepared_moved_stopped_homed_and_its_fault_reset(
     press(page, "jog-plus")
     further_than(page, 190)
     page.keyboard.press("Escape")
-    ended(page, "stopped by the drive, or by STOP")
+    # The key lets go as well: whichever is heard first ends the order, and STOP is what stays.
+    told = page.get_by_test_id("motion-ended")
+    expect(told).to_have_text(re.compile("^Jog: (stopped by the drive, or by STOP|let go)"), timeout=MOVE_MS)
+    expect(page.get_by_text("STOP: all axes confirmed")).to_be_visible()
     page.mouse.up()
     assert bench.witness(CONTROL, size=2) == 0x010B, "nothing came after STOP"
     assert state(bench) in (0x07, 0x40)

@@ -439,9 +439,10 @@ class MotionDesk:
             if not stop:
                 raise UsageError(reason=f"{slug}: the site file names no external_stop")
             journal.note(Kind.EXTERNAL_STOP, slug, stop=stop)
+        taken_back = self.confirmed.takes_back(confirmed)
         self.confirmed = confirmed
         running = self.running
-        if running is not None and running.held and not (confirmed.rotor_locked and confirmed.people_out):
+        if running is not None and running.held and taken_back:
             self._stop_running(running, Ended.INTERLOCK)
 
     # -- interlocks and preparation ------------------------------------------------------------

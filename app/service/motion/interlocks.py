@@ -75,6 +75,14 @@ class Confirmed:
     people_out: bool = False
     external_stops: frozenset[str] = frozenset()
 
+    def takes_back(self, later: Confirmed) -> bool:
+        """Whether something that was confirmed here is not any more ``later``."""
+        return (
+            (self.rotor_locked and not later.rotor_locked)
+            or (self.people_out and not later.people_out)
+            or bool(self.external_stops - later.external_stops)
+        )
+
 
 async def look(
     connection: Connection,
