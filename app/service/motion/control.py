@@ -245,10 +245,17 @@ class Control:
             raise AxisStateError(device=self.target.slug, state=f"{status:04X}h", wanted_key="axis_needed.known")
         return found
 
-    async def until(self, wanted: Collection[AxisState], timeout_s: float = STATE_TIMEOUT_S) -> AxisState:
-        """Wait for one of these states. Raises AxisStateError when another one stays, or a fault comes."""
+    async def until(
+        self, wanted: Collection[AxisState], timeout_s: float = STATE_TIMEOUT_S, or_overtaken: bool = False
+    ) -> AxisState:
+        """Wait for one of these states. Raises AxisStateError when another one stays, or a fault comes.
+
+        ``or_overtaken``: nor longer than until somebody else commands the axis, whose state is the answer then.
+        """
         end_s = asyncio.get_running_loop().time() + timeout_s
         while (state := await self.state()) not in wanted:
+            if or_overtaken and self.overtaken:
+                return state
             late = asyncio.get_running_loop().time() >= end_s
             if late or (state is AxisState.FAULT and AxisState.FAULT not in wanted):
                 keys = [one.text_key for one in AxisState if one in wanted]
@@ -412,7 +419,7 @@ class Control:
         await self.until({AxisState.SWITCHED_ON})
         self._require_held()
         await self.say(Word.HALT)
-        await self.until({AxisState.OPERATION_ENABLED})
+        await self.until({AxisState.OPERATION_ENABLED}, or_overtaken=True)
 
     async def reset_fault(self) -> AxisState:
         """Reset the fault; the state that came of it, which is the fault where its cause still stands.
