@@ -61,7 +61,8 @@ class ServerRange(NamedTuple):
             host = ip_address(server.host)
         except ValueError:
             return False
-        return host.version == self.first.version and self.first <= host <= self.last and server.port == self.port  # type: ignore[operator]
+        inside = host.version == self.first.version and int(self.first) <= int(host) <= int(self.last)
+        return inside and server.port == self.port
 
 
 def parse_range(text: str) -> ServerRange:
@@ -77,7 +78,7 @@ def parse_range(text: str) -> ServerRange:
         first, last = _ends(hosts)
     except ValueError as error:
         raise ValueError(f"'{text}' is not IP, IP-IP or NETWORK/BITS, with or without :PORT: {error}") from error
-    if first.version != last.version or first > last:  # type: ignore[operator]
+    if first.version != last.version or int(first) > int(last):
         raise ValueError(f"'{text}' ends before it begins")
     return ServerRange(first, last, port)
 

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 from app.errors import UsageError
-from app.model.description import Bus, Description
+from app.model.description import Description
 from app.model.description_file import load_builtin
+from app.model.site import MAX_NODE
 
 NodeKey = tuple[str, int]
 """Bus and node."""
 ServerTable = Mapping[NodeKey, str]
 """``host:port`` of the nodes of Modbus TCP buses."""
-MAX_NODE: Final = {Bus.CANOPEN: 127, Bus.MODBUS_TCP: 247}
 
 
 class NodeName(NamedTuple):

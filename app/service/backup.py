@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
@@ -86,19 +86,16 @@ async def read_devices(
 def to_set(
     report: ReadReport, turbine: str, person: str, reason: str, wall_ns: int, work_order: str = ""
 ) -> ParameterSet:
-    """The parameter set of a complete read. Of what is changed for motion it holds what stands there otherwise."""
+    """The parameter set of a complete read."""
     target = report.target
-    axes = target.gate.claims.axes
-    before = {} if axes is None else axes.before(target.slug)
-    values = {**report.values, **{at: decode(target.entry(at), was) for at, was in before.items()}}
     time = iso_time(wall_ns // SECOND_NS * SECOND_NS)
     return ParameterSet(
         description_id=target.description.id,
         description_version=target.description.version,
-        identity=identity_of(values),
+        identity=identity_of(report.values),
         origin=Origin(turbine, target.slug, target.node, time, person, reason, f"hubside {__version__}", work_order),
-        values=values,
-        unread={at: why(error) for at, error in report.failed.items() if not is_empty(error) and at not in before},
+        values=report.values,
+        unread={address: why(error) for address, error in report.failed.items() if not is_empty(error)},
         empty=tuple(address for address, error in report.failed.items() if is_empty(error)),
     )
 
@@ -106,12 +103,26 @@ def to_set(
 def whole_sets(
     reports: Iterable[ReadReport], turbine: str, person: str, reason: str, wall_ns: int, work_order: str = ""
 ) -> list[ParameterSet]:
-    """The set of every device that was read; of one that was lost on the way there is none."""
+    """The set of every device that was read; of one that was lost on the way there is none.
+
+    They are to be kept: of what is changed for motion they hold what stands there otherwise.
+    """
     return [
-        to_set(report, turbine, person, reason, wall_ns, work_order)
+        to_set(_without_motion(report), turbine, person, reason, wall_ns, work_order)
         for report in reports
         if report.values and report.lost is None
     ]
+
+
+def _without_motion(report: ReadReport) -> ReadReport:
+    target = report.target
+    axes = target.gate.claims.axes
+    values = dict(report.values)
+    for address, (was, now) in ({} if axes is None else axes.changed(target.slug)).items():
+        entry = target.entry(address)
+        if values.get(address) == decode(entry, now):  # else somebody has written it since, or a restart ended it
+            values[address] = decode(entry, was)
+    return replace(report, values=values)
 
 
 def write_sets(folder: Path, sets: Iterable[ParameterSet]) -> list[Path]:

@@ -12,7 +12,7 @@ anybody else; while it is prepared it is neither saved nor restarted, and what i
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import Enum
@@ -59,10 +59,10 @@ class Axes(Protocol):
     """What the desk of a connection keeps others from."""
 
     def keeper(self, device: str, address: Address | None) -> str | None:
-        """Who keeps the device from being saved or restarted (None), or an object of it from being written."""
+        """Who keeps an object of the device from being written; None: the device from being restarted or restored."""
 
-    def before(self, device: str) -> dict[Address, bytes]:
-        """What objects held that are changed for motion."""
+    def changed(self, device: str) -> Mapping[Address, tuple[bytes, bytes]]:
+        """What is changed there for motion: what each object held, and what was written."""
 
 
 class Claims:
@@ -92,7 +92,7 @@ class Claims:
     def require_free(self, device: str, address: Address | None = None) -> None:
         """Raises DeviceBusyError where somebody has the device for himself, or moves it.
 
-        ``address`` is about to be written; None: the device is about to be saved or restarted.
+        ``address`` is about to be written, 1010h of a save; None: the device is about to be restarted.
         """
         self.require_unclaimed(device)
         self._require_no_motion(device, address)

@@ -49,8 +49,8 @@ class Target:
     async def pass_gate(self, driver: Driver, address: Address | None = None) -> None:
         """Raises RestoreOpenError where a restore of the device is not finished, DeviceBusyError where it is in use.
 
-        ``address`` is about to be written; None: the device is about to be saved or restarted. Its identity is read
-        for that where nobody has seen it yet. Raises NoAnswerError, BusLostError, ConsentError.
+        ``address`` is about to be written, 1010h of a save; None: the device is about to be restarted. Its identity is
+        read for that where nobody has seen it yet. Raises NoAnswerError, BusLostError, ConsentError.
         """
         await self.gate.check(self.device, lambda: self._identity(driver), address)
 

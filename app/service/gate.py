@@ -96,8 +96,8 @@ class Gate:
     ) -> None:
         """Raises RestoreOpenError, DeviceBusyError. ``ask`` reads what the device says of itself.
 
-        It is asked only where some restore is open and no name decides. ``address`` is about to be written; None: the
-        device is about to be saved or restarted.
+        It is asked only where some restore is open and no name decides. ``address`` is about to be written, 1010h of a
+        save; None: the device is about to be restarted.
         """
         await self.check_restores(device, ask)
         self.claims.require_free(device.slug, address)  # at last: what is asked takes its time

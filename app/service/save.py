@@ -49,8 +49,7 @@ async def save(
     Not proven before a restart. Raises PreconditionError (the device stands not still, or has no such category: nothing
     was saved), SdoAbortError, NoAnswerError or UnverifiedError; then nothing is known of the non-volatile memory.
     """
-    await target.pass_gate(driver)
-    save_command(target, category)
+    await target.pass_gate(driver, save_command(target, category).address)
     started_ns = now_ns()
     try:
         await driver.save(target.node, category)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Awaitable, Callable, Iterator
+from collections.abc import Awaitable, Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from enum import Enum
@@ -45,6 +45,7 @@ from app.service.motion.lease import Holder, Lease
 from app.service.motion.left import Left
 from app.service.motion.preparation import Prepared
 from app.service.stop import CONTROLWORD, is_axis
+from app.wire.sdo_follower import SAVE_INDEX
 
 UNKNOWN: Final = "–"
 log = logging.getLogger(__name__)
@@ -170,19 +171,17 @@ class MotionDesk:
     # -- what others are kept from --------------------------------------------------------
 
     def keeper(self, device: str, address: Address | None) -> str | None:
-        """See ``service.claims.Axes``. What stands of an earlier server is not to be saved either."""
-        running, holder = self.running, self.lease.holder
-        person = UNKNOWN if holder is None else holder.person
-        if running is not None and running.slug == device:
-            return person
-        changed = self.left.of(device)
-        if device in self.prepared:
-            return person if address is None or address in changed else None
-        return person if address is None and changed and not self._closed else None
+        """See ``service.claims.Axes``. What an earlier server left is not saved either; a restart ends it."""
+        changed, saves = self.left.of(device), address is not None and address.major == SAVE_INDEX
+        moves = self.running is not None and self.running.slug == device
+        prepared = device in self.prepared and (address is None or saves or address in changed)
+        if not (moves or prepared or (saves and changed)):
+            return None
+        return UNKNOWN if self.lease.holder is None else self.lease.holder.person
 
-    def before(self, device: str) -> dict[Address, bytes]:
+    def changed(self, device: str) -> Mapping[Address, tuple[bytes, bytes]]:
         """See ``service.claims.Axes``."""
-        return {address: changed.was for address, changed in self.left.of(device).items()}
+        return self.left.of(device)
 
     # -- looking after it ---------------------------------------------------------------
 

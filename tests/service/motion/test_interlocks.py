@@ -14,13 +14,14 @@ from app.drivers.can_config import parse_can
 from app.drivers.can_port import CanPort
 from app.errors import DeviceBusyError, InterlockError, LeaseHeldError, NotHeldError
 from app.model.address import Address
-from app.service.backup import read_device, to_set
+from app.service.backup import read_device, to_set, whole_sets
 from app.service.claims import Work
 from app.service.connection import Connection
 from app.service.gate import Block
 from app.service.motion.brake_test import try_brake
 from app.service.motion.desk import Ended, MotionDesk
 from app.service.motion.interlocks import POSITION, Confirmed, Interlock
+from app.service.motion.left import Changed
 from app.service.motion.moves import jog
 from app.service.save import restart, save
 from app.service.write import write_raw
@@ -251,11 +252,27 @@ async def test_what_the_proof_rests_on_stays_while_it_is_prepared_and_all_else_m
         written = await write_raw(driver, target, RAMP, 1400, journal)
         assert written.read == 1400
         assert await number(connection, ABORT) == 3
-        found = to_set(await read_device(driver, target, [ABORT, WATCH, RAMP]), "wtg-07", "tester", "", 0)
-        assert found.values[ABORT] == before != 3, "a set holds what stands there otherwise"
+        read = await read_device(driver, target, [ABORT, WATCH, RAMP])
+        assert to_set(read, "wtg-07", "tester", "", 0).values[ABORT] == 3, "what a restore goes by is what stands there"
+        (found,) = whole_sets([read], "wtg-07", "tester", "", 0)
+        assert found.values[ABORT] == before != 3, "a set that is kept holds what stands there otherwise"
         assert found.values[RAMP] == 1400
         await desk.put_back(AXIS, page.fence)
         await save(driver, target, journal, connection.stamper)
+
+
+async def test_what_an_earlier_server_left_is_not_saved_and_a_restart_ends_it(connection: Connection) -> None:
+    target, journal = connection.target(AXIS), connection.journal
+    driver = connection.driver(target)
+    async with at_the_desk(connection) as (desk, _):
+        await desk.left.note(AXIS, ABORT, Changed(b"\x01\x00", b"\x03\x00"))
+        with pytest.raises(DeviceBusyError):
+            await save(driver, target, journal, connection.stamper)
+        with connection.gate.claims.held(Work.RESTORE, "ben", (AXIS,)):
+            pass
+        (found,) = whole_sets([await read_device(driver, target, [ABORT])], "wtg-07", "tester", "", 0)
+        assert found.values[ABORT] == await number(connection, ABORT) == 1, "nobody has written it"
+        await restart(driver, target, journal, connection.stamper)
 
 
 async def test_another_person_does_not_get_the_lease_by_the_name_of_its_page(connection: Connection) -> None:
