@@ -69,11 +69,11 @@ async def scope_at(connection: Connection, store: Store | None = None) -> AsyncI
             kept.close()
 
 
-async def until(holds: Callable[[], bool]) -> None:
-    """Until a condition holds, within the deadline."""
+async def until(holds: Callable[[], bool], every_s: float = 0.01) -> None:
+    """Until a condition holds, within the deadline; looked at ``every_s`` seconds."""
     async with asyncio.timeout(DEADLINE_S):
         while not holds():  # noqa: ASYNC110  what is waited for has no event
-            await asyncio.sleep(0.01)
+            await asyncio.sleep(every_s)
 
 
 async def kept(desk: ScopeDesk, count: int = 1) -> list[str]:
