@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import re
 import time
+from collections.abc import Iterator
+from pathlib import Path
 
+import canopen
 import pytest
-from playwright.sync_api import BrowserContext, Error, Page, expect
+from playwright.sync_api import Browser, BrowserContext, Error, Page, expect
 
-from tests.e2e.browser import SIZE
+from tests.e2e.browser import SIZE, signed_in
+from tests.e2e.conftest import Twins
+from tests.e2e.processes import running
+from tests.e2e.test_interoperation import EDS
 from tests.e2e.test_page_quality import AXE
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(300)]
@@ -273,4 +280,53 @@ def test_axe_finds_nothing_serious_and_nothing_is_cut(
     assert wide <= SIZE["width"]
     page.get_by_test_id("give-back").click()
     expect(page.get_by_test_id("control")).to_have_count(0)
+    page.close()
+
+
+PROFILE_VELOCITY = 3
+ENABLED = (0x06, 0x07, 0x0F)
+
+
+@pytest.fixture
+def foreign(twins: Twins, browser: Browser, tmp_path: Path) -> Iterator[tuple[BrowserContext, str]]:
+    """A bench beside an axis that another tool has enabled, and that turns by its word alone."""
+    network = canopen.Network()
+    network.connect(interface="socketcand", host="127.0.0.1", port=twins.port, channel="can0")
+    try:
+        pmc = network.add_node(11, str(EDS / "oat_pmc.eds"))
+        pmc.sdo.RESPONSE_TIMEOUT = 5.0
+        pmc.nmt.wait_for_heartbeat(timeout=10)
+        pmc.sdo[0x6060].raw = PROFILE_VELOCITY
+        pmc.sdo[0x60FF].raw = -100
+        for word in ENABLED:
+            pmc.sdo[0x6040].raw = word
+        assert pmc.sdo[0x6041].raw & 0x6F == 0x27, "operation enabled"
+    finally:
+        network.disconnect()
+    serving = ("--data", str(tmp_path / "data"), "serve", "--site", str(twins.site), "--port", "0", "--json")
+    with running(*serving) as served:
+        url = json.loads(served.wait_for('"url"'))["url"]
+        with signed_in(browser, url) as context:
+            yield context, url
+
+
+def test_escape_inside_the_3d_view_stops_what_another_tool_has_moved(foreign: tuple[BrowserContext, str]) -> None:
+    """The key goes to the frame, not to the page: nobody holds a button here, and nothing else ends this motion."""
+    context, url = foreign
+    page = context.new_page()
+    page.goto(f"{url.split('?')[0]}axis?blade=1")
+    state(page, "operation_enabled")
+    canvas = page.frame_locator("iframe").locator("canvas").first
+    expect(canvas).to_be_visible(timeout=MOVE_MS)
+    before = angle(page)
+    page.wait_for_function(
+        "to => parseFloat(document.querySelector('[data-testid=axis-angle]').textContent) < to",
+        arg=before - 0.5,
+        timeout=MOVE_MS,
+    )
+    page.locator("iframe").click(position={"x": 20, "y": 120}, force=True)
+    assert page.evaluate("document.activeElement.tagName") == "IFRAME"
+    page.keyboard.press("Escape")
+    state(page, "ready_to_switch_on|switch_on_disabled|quick_stop_active")
+    stands_still(page)
     page.close()
