@@ -36,6 +36,12 @@ class Busy:
             self._job = (await self._post("backup", reason="bench"))["id"]
         await asyncio.sleep(LOOK_S)
 
+    async def over(self) -> None:
+        """No backup runs any more."""
+        async with asyncio.timeout(TIMEOUT_S):
+            while self._job is not None and (await self._get(f"jobs/{self._job}"))["state"] == "running":  # noqa: ASYNC110
+                await asyncio.sleep(LOOK_S)
+
     async def saves(self) -> None:
         """A save of 10 s runs at every axis: another one where STOP has ended the last."""
         for slug in SLUGS:

@@ -11,7 +11,6 @@ No peer does this: ratio = limit / ours, the worse of both.
 from __future__ import annotations
 
 import os
-import shutil
 import statistics
 import tempfile
 import time
@@ -22,6 +21,7 @@ from typing import Final, NamedTuple
 
 from playwright.sync_api import Browser, Page, sync_playwright
 
+from bench._chromium import CHROMIUM, FLAGS
 from bench._cpu import tree_cpu_s
 from bench._priority import preferred
 from bench._process import Child
@@ -33,17 +33,6 @@ IDLE_LIMIT: Final = 0.40
 SETTLE_S: Final = 2.0
 """After the first values: the first look at all parameters has passed."""
 WAIT_MS: Final = 30_000
-CHROMIUM: Final = os.environ.get("CHROMIUM") or shutil.which("chromium") or "/usr/bin/chromium"
-FLAGS: Final = (
-    "--no-sandbox",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-)
 _LIVE: Final = (
     "() => [1, 2, 3].every(blade => /\\d\\d\\.\\d\\d°/.test("
     "document.querySelector(`[data-testid=blade-${blade}] [data-testid=angle]`)?.textContent ?? ''))"

@@ -1,13 +1,14 @@
-"""From the press of STOP to the controlword on the bus, while the SDO channel is busy, against the ordinary SDO queue.
+"""From the press of STOP or FEATHER to the controlword on the bus, while the SDO channel is busy, against its queue.
 
-The real thing: ``hubside serve`` beside twins in a process of their own. STOP is pressed as the page does, by a
-request; its frame is seen by another client of the same simulated bus. Meanwhile nothing else runs, or a backup of all
-six devices, or a save of 10 s at every axis, or a restore of a station; first while the nodes are pre-operational, so
-that the command goes by SDO, then while they are operational, by RPDO. The peer sends the same command through the
-queue of the same driver, as an ordinary write of 6040h: it waits for what runs before it. Both
-clocks are the host's monotonic one.
+The real thing: ``hubside serve`` beside twins in a process of their own. It is pressed as the page does, by a request,
+and in a real page of a real browser, by the key Esc and the button; its frame is seen by another client of the same
+simulated bus. Meanwhile nothing else runs, or a backup of all six devices, or a save of 10 s at every axis, or a
+restore of a station; first while the nodes are pre-operational, so that the command goes by SDO, then while they are
+operational, by RPDO. The peer sends the same command through the queue of the same driver, as an ordinary write of
+6040h: it waits for what runs before it. All clocks are the host's monotonic one; the times of a key count from before
+the browser is told of it.
 
-Three axes are stopped by each press; the last of the three frames counts.
+Three axes are told by each press; the last of the three frames counts.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ import math
 import statistics
 import tempfile
 import time
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -30,28 +31,25 @@ from app.errors import HubsideError
 from app.model.address import Address
 from app.model.description import Verify
 from app.model.description_file import load_builtin
-from app.wire.frame import Can, Frame, Stamper
-from app.wire.nmt import NmtCommand
+from app.service.stop import CONTROLWORD, Command
+from app.wire.frame import Stamper
 from bench._busy import LOOK_S, Busy
+from bench._page import PressedPage
 from bench._priority import preferred
 from bench._process import Child
 from bench._result import Result
 from bench._site import write_site
+from bench._watch import AXES, Watch, word_of
 from bench.backup import wait_for
 
 TARGET: Final = 10.0
 LIMIT_S: Final = 0.050
 BITRATE: Final = 500_000
-AXES: Final = (11, 12, 13)
-CONTROLWORD: Final = Address(0x6040)
-QUICK_STOP: Final = (0x010B).to_bytes(2, "little")
 SAVE_MS: Final = 10_000
 MARGIN_S: Final = 30.0
 FIRSTLOOK_S: Final = 4.0
 """The server reads all devices first."""
 _SAVE: Final = Address(0x1010, 3)
-_RPDO1: Final = 0x200
-_SDO: Final = 0x600
 
 
 class Run(NamedTuple):
@@ -94,7 +92,7 @@ async def measure(presses: int, peers: int) -> Result:
         peer.p99_s / worst,
         TARGET,
         (
-            f"three axes, {BITRATE} bit/s, from the request to the last of three frames; scheduling: {scheduling}",
+            f"three axes, {BITRATE} bit/s, from the press to the last of three frames; scheduling: {scheduling}",
             *(_line(run) for run in ours),
             f"peer, {peer.name}: {', '.join(f'{each:.2f}' for each in peer.times_s)} s",
         ),
@@ -107,54 +105,6 @@ def _line(run: Run) -> str:
         f"ours, {run.name}: median {1e3 * statistics.median(run.times_s):.1f} ms, p99 {1e3 * run.p99_s:.1f} ms, "
         f"worst {1e3 * max(run.times_s):.1f} ms, {len(run.times_s)} presses; limit {1e3 * LIMIT_S:.0f} ms"
     )
-
-
-class Watch:
-    """Another client of the bus: when a quick stop went to an axis, by PDO or SDO."""
-
-    def __init__(self, driver: CanOpenDriver) -> None:
-        self._driver = driver
-        self._seen: dict[int, float] = {}
-        self._all = asyncio.Event()
-        self._loop = asyncio.get_running_loop()
-
-    def hear(self, frames: list[Frame]) -> None:
-        """Called on the receive thread."""
-        now_s = time.monotonic()
-        for frame in frames:
-            can = frame.payload
-            if isinstance(can, Can) and (node := _stopped(can)) is not None:
-                self._loop.call_soon_threadsafe(self._note, node, now_s)
-
-    def _note(self, node: int, now_s: float) -> None:
-        self._seen.setdefault(node, now_s)
-        if len(self._seen) == len(AXES):
-            self._all.set()
-
-    async def last(self, timeout_s: float) -> float:
-        """When the last axis was told."""
-        async with asyncio.timeout(timeout_s):
-            await self._all.wait()
-        return max(self._seen.values())
-
-    def start(self, nodes: tuple[int, ...]) -> None:
-        """Have them operational, so that their RPDO is in force."""
-        for node in nodes:
-            self._driver.nmt(NmtCommand.START, node)
-
-    def clear(self) -> None:
-        """Begin anew."""
-        self._seen.clear()
-        self._all.clear()
-
-
-def _stopped(can: Can) -> int | None:
-    for node in AXES:
-        if can.can_id == _RPDO1 + node and can.data[:2] == QUICK_STOP:
-            return node
-        if can.can_id == _SDO + node and can.data[1:4] == b"\x40\x60\x00" and can.data[4:6] == QUICK_STOP:
-            return node
-    return None
 
 
 @asynccontextmanager
@@ -190,32 +140,67 @@ async def _ours(url: str, address: str, presses: int) -> list[Run]:
         await client.get(url)
         await asyncio.sleep(FIRSTLOOK_S)
         await client.post("/api/live/consent", json={})  # a page has asked for something before it stops anything
-        runs, page = [], Busy(client)
+        runs, work = [], Busy(client)
         for way in ("by SDO", "by RPDO"):
             if way == "by RPDO":
                 watch.start(AXES)
-            for name, begin in (
-                ("alone", page.nothing),
-                ("beside a backup", page.backup),
-                ("beside saves", page.saves),
-                ("beside a restore", page.restore),
-            ):
-                long = begin in (page.saves, page.restore)  # these take seconds each
-                times = presses // 8 if long else presses
-                times_s = [await _press(client, watch, begin) for _ in range(times)]
-                runs.append(Run(f"{way}, {name}", times_s))
-        await page.end()
+            runs += await _requests(client, watch, work, way, presses)
+        runs += await _keys(base, client, watch, work, presses // 2)
+        await work.end()
         return runs
 
 
-async def _press(client: httpx.AsyncClient, watch: Watch, begin: Callable[[], Awaitable[None]]) -> float:
-    await begin()
-    watch.clear()
+async def _requests(client: httpx.AsyncClient, watch: Watch, work: Busy, way: str, presses: int) -> list[Run]:
+    """STOP and FEATHER by a request, as the page sends it."""
+    runs = []
+    for command, name, begin in (
+        (Command.STOP, "alone", work.nothing),
+        (Command.STOP, "beside a backup", work.backup),
+        (Command.STOP, "beside saves", work.saves),
+        (Command.STOP, "beside a restore", work.restore),
+        (Command.FEATHER, "alone", work.nothing),
+        (Command.FEATHER, "beside a backup", work.backup),
+    ):
+        long = begin in (work.saves, work.restore)  # these take seconds each
+        times_s = []
+        for _ in range(presses // 8 if long else presses):
+            await begin()
+            times_s.append(await _press(client, watch, command))
+        runs.append(Run(f"{command.name} {way}, {name}", times_s))
+    await _press(client, watch, Command.STOP)  # nothing is on its way to feather when the next begins
+    return runs
+
+
+async def _press(client: httpx.AsyncClient, watch: Watch, command: Command) -> float:
+    watch.expect(command)
     started_s = time.monotonic()
-    answer = asyncio.create_task(client.post("/api/live/stop", json={}))
+    answer = asyncio.create_task(client.post(f"/api/live/{command.name.lower()}", json={}))
     took_s = await watch.last(MARGIN_S) - started_s
     (await answer).raise_for_status()
     return took_s
+
+
+async def _keys(base: str, client: httpx.AsyncClient, watch: Watch, work: Busy, presses: int) -> list[Run]:
+    """STOP by Esc while an axis has power, and FEATHER by its button, in a browser."""
+    runs = []
+    async with PressedPage.at(base, client) as page:
+        for name, begin in (("alone", work.nothing), ("beside a backup", work.backup)):
+            stop_s, feather_s = [], []
+            for _ in range(presses):
+                await work.over()  # there is one SDO channel to a node, and the next line wants it
+                await watch.enable()
+                await page.until_moving()
+                await begin()
+                watch.expect(Command.STOP)
+                pressed_s = await page.escape()
+                stop_s.append(await watch.last(MARGIN_S) - pressed_s)
+                await begin()
+                watch.expect(Command.FEATHER)
+                pressed_s = await page.click("feather")
+                feather_s.append(await watch.last(MARGIN_S) - pressed_s)
+                await _press(client, watch, Command.STOP)
+            runs += [Run(f"STOP by Esc, {name}", stop_s), Run(f"FEATHER by its button, {name}", feather_s)]
+    return runs
 
 
 # -- the peer ---------------------------------------------------------------------------------
@@ -231,9 +216,9 @@ async def _peer(address: str, presses: int) -> Run:
             for _ in range(presses):
                 saves = [asyncio.create_task(driver.write(node, _SAVE, b"save", verify=Verify.ACK)) for node in AXES]
                 await asyncio.sleep(2 * LOOK_S)
-                watch.clear()
+                watch.expect(Command.STOP)
                 started_s = time.monotonic()
-                stops = [driver.write(node, CONTROLWORD, QUICK_STOP, verify=Verify.ACK) for node in AXES]
+                stops = [driver.write(node, CONTROLWORD, word_of(Command.STOP), verify=Verify.ACK) for node in AXES]
                 done = asyncio.gather(*stops, return_exceptions=True)
                 times_s.append(await watch.last(3 * MARGIN_S) - started_s)
                 await done
