@@ -17,9 +17,10 @@ from app.model.axis_state import ENERGISED, AxisState
 from app.service.journal import Journal
 from app.service.motion.bounds import HIGHEST, LOWEST, TARGET_VELOCITY
 from app.service.motion.control import AxisMode, Control, Word
-from app.service.motion.desk import Doing, Ended, MotionDesk, Running
+from app.service.motion.desk import MotionDesk
 from app.service.motion.interlocks import POSITION
 from app.service.motion.moves import come_to_rest, raw_of, set_object, wait
+from app.service.motion.running import Doing, Ended, Running
 
 OUTPUTS: Final = Address(0x60FE, 3)
 BRAKE: Final = 1 << 0

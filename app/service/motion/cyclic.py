@@ -30,8 +30,9 @@ from app.service.journal import Journal
 from app.service.motion.borrowed import TARGET, Borrowed, PdoFound
 from app.service.motion.control import AxisMode, Control, Word
 from app.service.motion.courses import CURRENT, FOLLOWING, POSITION, VELOCITY, Courses
-from app.service.motion.desk import Doing, Ended, MotionDesk, Running
+from app.service.motion.desk import MotionDesk
 from app.service.motion.moves import STOPPING, come_to_rest
+from app.service.motion.running import Doing, Ended, Running
 from app.service.motion.signals import MOST_DPS, DriveLimits, Shape, Signal, check
 from app.service.stop import CONTROLWORD, STATUSWORD
 from app.service.write import know_what_it_rests_on, write_raw

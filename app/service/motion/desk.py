@@ -11,8 +11,6 @@ import asyncio
 import logging
 from collections.abc import Awaitable, Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
-from enum import Enum
 from time import monotonic
 from typing import Final
 
@@ -27,23 +25,23 @@ from app.errors import (
     NotHeldError,
     NotPreparedError,
     OldOrderError,
-    OvertakenError,
     PdoBusyError,
     UsageError,
 )
 from app.model.address import Address
-from app.model.axis_state import AxisState
 from app.service.connection import Connection
 from app.service.devices import Target
 from app.service.journal import Journal, Kind
 from app.service.motion import interlocks, preparation
-from app.service.motion.control import Control, Word
+from app.service.motion.control import Control
 from app.service.motion.dead_man import SILENCE_S, DeadMan
+from app.service.motion.halting import Halting
 from app.service.motion.heartbeat import Heartbeat, NoHeartbeat
 from app.service.motion.interlocks import Confirmed, Interlock, Standing
 from app.service.motion.lease import Holder, Lease
 from app.service.motion.left import Left
 from app.service.motion.preparation import Prepared
+from app.service.motion.running import Doing, Ended, Last, Running
 from app.service.stop import CONTROLWORD, is_axis
 from app.wire.sdo_follower import SAVE_INDEX
 
@@ -51,83 +49,14 @@ UNKNOWN: Final = "–"
 log = logging.getLogger(__name__)
 
 TICK_S: Final = 0.02
-BACK_S: Final = 30.0
-"""A device that cannot be reached for so long may have another master since."""
-OBEY_S: Final = 0.25
-"""An axis that is still enabled so long after a quick stop has not heard it."""
 CLOSE_S: Final = 8.0
 LOOK_AGAIN_S: Final = 0.5
 """So often it is looked while an axis moves whether an interlock holds it back now."""
 
 
-class Doing(Enum):
-    """What is under way at an axis; the value is the end of its text key ``motion.doing.…``."""
-
-    PREPARING = "preparing"
-    PUTTING_BACK = "putting_back"
-    JOG = "jog"
-    MOVE = "move"
-    HOMING = "homing"
-    RESET = "reset"
-    HOLD = "hold"
-    FEATHER = "feather"
-    BRAKE_TEST = "brake_test"
-    SIGNAL = "signal"
-
-
-class Ended(Enum):
-    """Why a motion ended; the value is the end of its text key ``motion.ended.…``."""
-
-    DONE = "done"
-    RELEASED = "released"
-    SILENT = "silent"
-    LEASE = "lease"
-    LINK = "link"
-    INTERLOCK = "interlock"
-    LIMIT = "limit"
-    STOPPED = "stopped"
-    FAILED = "failed"
-
-
 _UNHEARD: Final = (BusLostError, NoAnswerError)
 _STOPPED: Final = (Ended.SILENT, Ended.LEASE, Ended.LINK, Ended.INTERLOCK)
 """A quick stop was sent already."""
-
-
-@dataclass
-class Running:
-    """A motion under way.
-
-    ``held``: it goes on only while its person holds it; ``turning``: the axis was told to run; ``let_go``: the word by
-    which it stops when its person lets go.
-    """
-
-    slug: str
-    doing: Doing
-    control: Control
-    held: bool
-    order: int = 0
-    turning: bool = False
-    let_go: Word = Word.HALT
-    why: Ended | None = None
-    task: asyncio.Task[None] | None = None
-    over: asyncio.Event = field(default_factory=asyncio.Event)
-
-    def end(self, why: Ended) -> None:
-        """It ends now, for the first reason that there was; what was done, and then failed to come to rest, failed."""
-        if self.why is None or (self.why is Ended.DONE and why is Ended.FAILED):
-            self.why = why
-        self.over.set()
-
-
-@dataclass(frozen=True, slots=True)
-class Last:
-    """The latest motion: axis, what, why it ended, and the error where it failed."""
-
-    slug: str
-    doing: Doing
-    why: Ended
-    error: HubsideError | None
 
 
 class MotionDesk:
@@ -162,11 +91,11 @@ class MotionDesk:
             else NoHeartbeat(now_s)
             for bus in connection.turbine.buses
         }
+        self._halting = Halting(connection, journal, self.dead_man, self._heartbeats, self.prepared)
         self._reconnects: dict[str, int] = {}
         connection.gate.claims.axes = self
         self._ticker: asyncio.Task[None] | None = None
         self._changing = asyncio.Lock()
-        self._chores: set[asyncio.Task[None]] = set()
 
     # -- what others are kept from --------------------------------------------------------
 
@@ -194,10 +123,10 @@ class MotionDesk:
             await asyncio.wait({running.task}, timeout=3.0)
         with suppress(TimeoutError):
             await asyncio.wait_for(self._put_all_back(), CLOSE_S)
-        for task in (self._ticker, *self._chores):
-            if task is not None:
-                task.cancel()
-                await asyncio.gather(task, return_exceptions=True)
+        if self._ticker is not None:
+            self._ticker.cancel()
+            await asyncio.gather(self._ticker, return_exceptions=True)
+        await self._halting.close()
 
     def _look_after(self) -> None:
         if self._ticker is None or self._ticker.done():
@@ -215,9 +144,9 @@ class MotionDesk:
         running = self.running
         if running is not None and running.held and not running.over.is_set():
             if not self.dead_man.present:
-                self._stop_running(running, Ended.SILENT)
+                self._halting.stop(running, Ended.SILENT)
             elif not self.dead_man.holds(running.order):
-                self._halt_running(running)
+                self._halting.let_go(running)
         for name, heartbeat in self._heartbeats.items():
             if self._is_interrupted(name) and heartbeat.cut():
                 self._link_lost(name)
@@ -239,40 +168,17 @@ class MotionDesk:
         """
         running = self.running
         if running is not None and running.control.target.device.bus == bus:
-            self._lost(running)
+            self._halting.lost(running)
         for axis in self.prepared.values():
             if axis.control.target.device.bus == bus:
                 axis.void()
-
-    def _lost(self, running: Running) -> None:
-        """Nothing is heard of the axis any more."""
-        self._stop_running(running, Ended.LINK)
-        if not self._heartbeats[running.control.target.device.bus].watched:
-            if (axis := self.prepared.get(running.slug)) is not None:
-                axis.void()
-            self._journal.note(Kind.MOTION_LOST, running.slug)
-            self._chore(self._stop_once_back(running.control))
-
-    async def _stop_once_back(self, control: Control) -> None:
-        """Quick stop as soon as the device can be reached again, unless somebody else has commanded it by then."""
-        link = self.connection.buses[control.target.device.bus]
-        end_s = monotonic() + BACK_S
-        while monotonic() < end_s and not control.overtaken:
-            if link.status.state is LinkState.CONNECTED:
-                try:
-                    await control.stop_by_write()
-                except (BusLostError, NoAnswerError) as error:
-                    log.warning("%s: not stopped yet: %s", control.target.slug, error.code)
-                else:
-                    return
-            await asyncio.sleep(TICK_S)
 
     def page_gone(self, page: str) -> None:
         """The socket of a page is closed: who held by it holds nothing any more."""
         holder = self.lease.holder
         running = self.running
         if holder is not None and holder.page == page and running is not None and running.held:
-            self._stop_running(running, Ended.SILENT)
+            self._halting.stop(running, Ended.SILENT)
 
     def beat(
         self, page: str, fence: int, number: int, holding: bool, order: int = 0, sent_s: float | None = None
@@ -291,80 +197,11 @@ class MotionDesk:
             and not running.over.is_set()
             and not self.dead_man.holds(running.order)
         ):
-            self._halt_running(running)
-
-    def _halt_running(self, running: Running) -> None:
-        """Let go: the axis halts by its ramp. One that does not run yet would be enabled by that word."""
-        if not running.turning:
-            running.control.release()
-            running.end(Ended.RELEASED)
-            return
-        try:
-            at_once = running.control.let_go(running.let_go)
-            running.end(Ended.RELEASED)
-            if not at_once:
-                self._chore(self._let_go_by_write(running))
-        except OvertakenError:  # STOP or FEATHER has it now
-            running.end(Ended.STOPPED)
-        except HubsideError as error:
-            log.warning("%s: halt was not sent: %s", running.slug, error.code)
-            self._stop_running(running, Ended.RELEASED)
-
-    async def _let_go_by_write(self, running: Running) -> None:
-        try:
-            await running.control.let_go_by_write(running.let_go)
-        except HubsideError as error:
-            log.warning("%s: halt was not sent: %s", running.slug, error.code)
-            self._stop_running(running, Ended.RELEASED)
-
-    def _stop_running(self, running: Running, why: Ended) -> None:
-        """Nobody is there: quick stop, at once, by whatever way there is; a person's STOP or FEATHER stays in force."""
-        running.end(why)
-        self.dead_man.release()
-        try:
-            by_pdo = running.control.stop()
-        except HubsideError as error:  # the link is lost, or the adapter is full: without us the drive stops by itself
-            log.warning("%s: quick stop was not sent: %s", running.slug, error.code)
-            self._heartbeats[running.control.target.device.bus].withhold(running.slug)
-            by_pdo = False
-        if not by_pdo:
-            self._chore(running.control.stop_by_write())
-        self._chore(self._see_off(running.control))
-        self._journal.note(Kind.MOTION_STOPPED, running.slug, reason=why.value)
-
-    async def _see_off(self, control: Control) -> None:
-        """A quick stop that the axis does not obey is written, and our heartbeat ends until it has no power."""
-        heartbeat = self._heartbeats[control.target.device.bus]
-        slug = control.target.slug
-        try:
-            await asyncio.sleep(OBEY_S)
-            if control.overtaken or await control.state() is not AxisState.OPERATION_ENABLED:
-                heartbeat.go_on(slug)
-                return
-        except HubsideError as error:
-            log.warning("%s: whether it stops is not known: %s", slug, error.code)
-        if control.overtaken:  # meanwhile: a FEATHER must not end by our silence
-            heartbeat.go_on(slug)
-            return
-        heartbeat.withhold(slug)
-        await control.stop_by_write()
-        if await control.until_off(preparation.OFF_TIMEOUT_S):
-            heartbeat.go_on(slug)
+            self._halting.let_go(running)
 
     def _end_running(self, why: Ended) -> None:
         if self.running is not None:
-            self._stop_running(self.running, why)
-
-    def _chore(self, work: Awaitable[None]) -> None:
-        async def run() -> None:
-            try:
-                await work
-            except HubsideError as error:
-                log.warning("motion: %s: %s", error.code, error)
-
-        task = asyncio.ensure_future(run())
-        self._chores.add(task)
-        task.add_done_callback(self._chores.discard)
+            self._halting.stop(self.running, why)
 
     # -- lease -----------------------------------------------------------------------------
 
@@ -415,7 +252,7 @@ class MotionDesk:
         for axis in self.prepared.values():
             axis.void()  # at once: what is being put back must not move meanwhile
         if self.prepared:
-            self._chore(self._put_all_back())
+            self._halting.chore(self._put_all_back())
 
     def admit(self, fence: int, order: int) -> None:
         """An order has come; those of a page have rising numbers.
@@ -442,7 +279,7 @@ class MotionDesk:
         self.confirmed = confirmed
         running = self.running
         if running is not None and running.held and taken_back:
-            self._stop_running(running, Ended.INTERLOCK)
+            self._halting.stop(running, Ended.INTERLOCK)
 
     # -- interlocks and preparation ------------------------------------------------------------
 
@@ -467,7 +304,7 @@ class MotionDesk:
             if running.over.is_set() or not running.held:
                 return
             if any(one.holds_back for one in found if one.interlock is not Interlock.RULES):
-                self._stop_running(running, Ended.INTERLOCK)
+                self._halting.stop(running, Ended.INTERLOCK)
                 return
 
     async def require_clear(self, slug: str) -> None:
@@ -600,7 +437,7 @@ class MotionDesk:
         running = self.running
         if running is not None and running.slug == slug:
             if running.held and not running.over.is_set():
-                self._halt_running(running)
+                self._halting.let_go(running)
             return
         control = self._control(self._axis(slug))
         control.own()
@@ -678,9 +515,9 @@ class MotionDesk:
             error = failed if isinstance(failed, HubsideError) else None
             if running.why not in _STOPPED:
                 if isinstance(failed, _UNHEARD) and not self._heartbeats[control.target.device.bus].watched:
-                    self._lost(running)  # a connection whose end nobody tells looks like this
+                    self._halting.lost(running)  # a connection whose end nobody tells looks like this
                 else:
-                    self._stop_running(running, Ended.FAILED)
+                    self._halting.stop(running, Ended.FAILED)
             running.end(Ended.FAILED)
             raise
         finally:

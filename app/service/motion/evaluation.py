@@ -11,10 +11,10 @@ from app.model.address import parse_address
 from app.service.motion import fits
 from app.service.motion.courses import CURRENT, DEMAND, FOLLOWING, POSITION, VELOCITY, as_document
 from app.service.motion.cyclic import INTERPOLATION_MS, SEND_S, Played
-from app.service.motion.desk import Ended
 from app.service.motion.fits import RampResponse, SineResponse, StepResponse
 from app.service.motion.loop_model import STEP_S, follow, identify_lag, set_points
 from app.service.motion.proposal import LEAST_LAG_S, Proposal, propose
+from app.service.motion.running import Ended
 from app.service.motion.signals import CORNER_S, REST_S, Curve, Shape
 
 MOST_POINTS: Final = 1500

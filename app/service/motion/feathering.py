@@ -13,9 +13,10 @@ from typing import Final
 from app.errors import AxisStateError
 from app.model.axis_state import ENERGISED, AxisState
 from app.service.motion.control import Word
-from app.service.motion.desk import Doing, Ended, MotionDesk, Running
+from app.service.motion.desk import MotionDesk
 from app.service.motion.interlocks import POSITION
 from app.service.motion.moves import come_to_rest, wait
+from app.service.motion.running import Doing, Ended, Running
 from app.service.stop import EFC_TARGET
 
 BEGIN_TIMEOUT_S: Final = 2.0

@@ -12,10 +12,11 @@ from app.model.axis_state import AxisState
 from app.service.journal import Journal, Kind
 from app.service.motion.borrowed import Borrowed
 from app.service.motion.control import ACKNOWLEDGED, TARGET_REACHED, AxisMode, Word
-from app.service.motion.desk import Doing, Ended, MotionDesk, Running
+from app.service.motion.desk import MotionDesk
 from app.service.motion.home_methods import METHOD, methods_of, searches
 from app.service.motion.interlocks import POSITION
 from app.service.motion.moves import come_to_rest, wait
+from app.service.motion.running import Doing, Ended, Running
 
 ATTAINED: Final = ACKNOWLEDGED
 """Bit 12 in homing mode."""

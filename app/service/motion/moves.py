@@ -32,9 +32,10 @@ from app.service.motion.control import (
     Control,
     Word,
 )
-from app.service.motion.desk import Doing, Ended, MotionDesk, Running
+from app.service.motion.desk import MotionDesk
 from app.service.motion.home_methods import searches
 from app.service.motion.interlocks import POSITION
+from app.service.motion.running import Doing, Ended, Running
 from app.service.write import know_what_it_rests_on, write_raw
 
 PROFILE_VELOCITY: Final = Address(0x6081)

@@ -17,12 +17,13 @@ from app.model.site import load_site
 from app.service.connection import Connection
 from app.service.motion.courses import POSITION
 from app.service.motion.cyclic import Played, Transport, play
-from app.service.motion.desk import Doing, Ended, MotionDesk, Running
+from app.service.motion.desk import MotionDesk
 from app.service.motion.evaluation import Evaluation, evaluate
 from app.service.motion.interlocks import Confirmed
 from app.service.motion.left import Left
 from app.service.motion.line import motion_line
 from app.service.motion.moves import move_to
+from app.service.motion.running import Doing, Ended, Running
 from app.service.motion.runs import SignalRuns
 from app.service.motion.signals import Shape, Signal
 from app.service.options import Options

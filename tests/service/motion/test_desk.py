@@ -20,12 +20,13 @@ from app.errors import (
 from app.model.address import Address
 from app.model.axis_state import AxisState
 from app.service.connection import Connection
-from app.service.motion.desk import Ended, MotionDesk
+from app.service.motion.desk import MotionDesk
 from app.service.motion.interlocks import Confirmed, Interlock
 from app.service.motion.left import Left
 from app.service.motion.line import motion_line
 from app.service.motion.moves import home, jog, move_to, reset_fault
 from app.service.motion.positions import positions
+from app.service.motion.running import Ended
 from app.service.stop import CONTROLWORD, Command, command_all
 from app.wire.nmt import NmtState
 from tests.e2e.test_interoperation import until

@@ -19,10 +19,11 @@ from app.service.claims import Work
 from app.service.connection import Connection
 from app.service.gate import Block
 from app.service.motion.brake_test import try_brake
-from app.service.motion.desk import Ended, MotionDesk
+from app.service.motion.desk import MotionDesk
 from app.service.motion.interlocks import POSITION, Confirmed, Interlock
 from app.service.motion.left import Changed
 from app.service.motion.moves import jog
+from app.service.motion.running import Ended
 from app.service.save import restart, save
 from app.service.write import write_raw
 from app.wire.frame import Can, Stamper

@@ -26,11 +26,12 @@ from app.model.address import Address
 from app.model.axis_state import AxisState
 from app.service.connection import Connection
 from app.service.journal import Kind
-from app.service.motion.desk import Ended, MotionDesk
+from app.service.motion.desk import MotionDesk
 from app.service.motion.homing import search_home
 from app.service.motion.interlocks import Confirmed, Interlock
 from app.service.motion.line import motion_line
 from app.service.motion.moves import hold, home, jog, move_to, reset_fault
+from app.service.motion.running import Ended
 from app.service.stop import CONTROLWORD, Command, command_all
 from app.wire.frame import Adu, Direction, Frame
 from app.wire.modbus.adu import decode_adu
