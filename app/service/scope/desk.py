@@ -108,7 +108,7 @@ class ScopeDesk:
             self.run = run
             for link in connection.buses.values():
                 link.listen(run.tap.hear)
-            run.sampling = Sampling(connection, _addresses(planned, connection), self._polling)
+            run.sampling = Sampling(connection, _addresses(planned, order, connection), self._polling)
             run.ticker = asyncio.create_task(self._tick_forever(run))
             self._journal.by(person).note(Kind.SCOPE_ARMED, None, signals=len(planned.signals))
             return run
@@ -181,10 +181,7 @@ class ScopeDesk:
         """What is known of the devices when a trigger was seen, once for each."""
         window = run.engine.window
         if window is not None and window.number not in run.seen:
-            concerned = {one.device for one in run.plan.signals}
-            device = run.order.trigger.device
-            if device is not None:
-                concerned.add(device)
+            concerned = _concerned(run.plan, run.order)
             targets = [one for one in run.connection.targets if one.slug in concerned]
             recording = None if run.connection.recording is None else run.connection.recording.status().file
             run.seen[window.number] = AtTrigger(
@@ -347,9 +344,14 @@ def _count(head: Head) -> int:
     return sum(one.count for one in head.signals)
 
 
-def _addresses(planned: Plan, connection: Connection) -> dict[str, list[Address]]:
-    """What is shown of each device, and what triggers where devices send nothing unasked."""
-    found: dict[str, list[Address]] = {}
+def _concerned(planned: Plan, order: ScopeOrder) -> set[str]:
+    """The devices whose values are kept with a capture."""
+    return {one.device for one in planned.signals} | ({order.trigger.device} - {None})  # type: ignore[operator]
+
+
+def _addresses(planned: Plan, order: ScopeOrder, connection: Connection) -> dict[str, list[Address]]:
+    """What is shown of each device concerned, and what triggers where devices send nothing unasked."""
+    found: dict[str, list[Address]] = {slug: [] for slug in sorted(_concerned(planned, order))}
     shown = [(one.device, one.place) for one in planned.signals]
     asked = [
         (target.slug, place)

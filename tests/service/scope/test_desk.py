@@ -194,6 +194,30 @@ async def test_the_values_in_force_are_those_of_the_trigger(connection: Connecti
         assert device.values == len(rows)
 
 
+async def test_parameters_that_nobody_knows_are_read_beside_the_signals(connection: Connection) -> None:
+    """Also those of the device that triggers; what PDOs bring leaves more room for it."""
+
+    def unknown(slug: str) -> list[Address]:
+        target = connection.target(slug)
+        parameters = [one.address for one in target.description if one.is_parameter and one.access.readable]
+        return [one for one in parameters if target.lookup(one) is None]
+
+    assert len(unknown(AXIS)) > 50, "nothing was read yet"
+    assert len(unknown(POWER)) > 50
+    async with scope_at(connection) as (desk, _wire):
+        await desk.arm(connection, order(POSITION, on=trigger(kind="fault", device=POWER)), "tester")
+        await until(lambda: scope_line(desk, True).signals[0].rate_hz > 20)
+        await until(lambda: not unknown(AXIS) and not unknown(POWER))
+        desk.trigger_now()
+        (found,) = await kept(desk)
+        rows = await desk.captures.in_force(found)
+        devices = {one.device: one for one in (await desk.captures.get(found)).head.devices}
+        for slug in (AXIS, POWER):
+            assert devices[slug].values == sum(row.device == slug for row in rows)
+            described = {one.address.short for one in connection.target(slug).description if one.is_parameter}
+            assert described == {row.address for row in rows if row.device == slug and row.parameter}
+
+
 async def test_a_lost_link_is_a_gap_in_the_capture(connection: Connection, served: Served) -> None:
     async with scope_at(connection) as (desk, _wire):
         await desk.arm(connection, order(POSITION, total_s=6.0, pre_s=0.2), "tester")
