@@ -1,10 +1,11 @@
 import "uplot/dist/uPlot.min.css";
 import { useComputedColorScheme } from "@mantine/core";
-import { useEffect, useRef } from "react";
+import { type KeyboardEvent, type PointerEvent, useEffect, useRef, useState } from "react";
 import UPlot from "uplot";
 import { localise } from "../../../model/values";
 import { useTexts } from "../../../texts/texts";
 import classes from "./Scope.module.css";
+import { nearest, next } from "./nearest";
 import { axisOf, coloursOf, labels } from "./ScopePlot";
 import { useWidth } from "./ScopePlots";
 
@@ -31,12 +32,15 @@ interface Props {
   name: string;
 }
 
-/** One curve over any axis: a spectrum, or one signal over another. */
+/** One curve over any axis: a spectrum, or one signal over another. Pointer and arrow keys read its points. */
 export function Chart({ x, y, colour, label, xUnit, yUnit, fromZero, drawn, name }: Props) {
   const t = useTexts();
   const scheme = useComputedColorScheme();
   const holder = useRef<HTMLDivElement>(null);
   const width = useWidth(holder);
+  const [reading, setReading] = useState<{ of: typeof x; at: number | null } | null>(null);
+  const at = reading?.of === x ? reading.at : null;
+  const setAt = (point: number | null) => setReading({ of: x, at: point });
   useEffect(() => {
     const element = holder.current;
     if (!element || width === 0) return;
@@ -76,19 +80,55 @@ export function Chart({ x, y, colour, label, xUnit, yUnit, fromZero, drawn, name
       made.destroy();
     };
   }, [x, y, colour, fromZero, width, scheme, t, drawn, name]);
+  const point = (event: PointerEvent) => {
+    const made = drawn.get(name);
+    if (!made) return;
+    const box = made.over.getBoundingClientRect();
+    const [left, top] = [event.clientX - box.left, event.clientY - box.top];
+    setAt(nearest(x, y, (value, scale) => made.valToPos(value, scale), left, top, fromZero));
+  };
+  const step = (event: KeyboardEvent) => {
+    if (event.key !== "ArrowLeft" && event.key !== "ArrowRight") return;
+    event.preventDefault();
+    setAt(next(x, y, at, event.key === "ArrowRight" ? 1 : -1));
+  };
+  const [atX, atY] = at === null ? [null, null] : [x[at] ?? null, y[at] ?? null];
+  const read = (value: number) => localise(value.toPrecision(4).replace("-", "−"), t.language);
+  const readX = (value: number) => (fromZero ? `${read(value)} ${xUnit}` : `${xUnit}: ${read(value)}`);
   return (
     <figure className={classes.chart}>
       <div
         ref={holder}
         className={classes.chartCanvas}
-        role="img"
+        role="group"
+        tabIndex={0}
         aria-label={label}
         data-testid={`scope-${name}`}
+        onPointerMove={point}
+        onPointerLeave={() => setAt(null)}
+        onKeyDown={step}
+        onBlur={() => setAt(null)}
       >
         <span className={classes.unit}>{yUnit}</span>
+        <Point made={drawn.get(name)} x={atX} y={atY} />
       </div>
-      <figcaption className={classes.axis}>{xUnit}</figcaption>
+      <figcaption className={classes.axis} aria-live="polite" data-testid={`read-${name}`}>
+        {atX === null || atY === null ? xUnit : `${readX(atX)} · ${read(atY)} ${yUnit}`.trim()}
+      </figcaption>
     </figure>
+  );
+}
+
+/** The point that is read, with a line down to its axis. */
+function Point({ made, x, y }: { made: UPlot | undefined; x: number | null; y: number | null }) {
+  if (!made || x === null || y === null) return null;
+  const [left, top] = [made.over.offsetLeft + made.valToPos(x, "x"), made.over.offsetTop];
+  const down = made.valToPos(y, "y");
+  return (
+    <>
+      <span className={classes.readLine} style={{ left, top, height: made.over.offsetHeight }} />
+      <span className={classes.readPoint} style={{ left, top: top + down }} />
+    </>
   );
 }
 
