@@ -10,6 +10,7 @@ from pathlib import Path
 from fastapi import FastAPI, Request, Response, WebSocket
 
 from app import __version__
+from app.model.roles import SignedIn
 from app.model.texts import LANGUAGES, load_texts
 from app.scene.hub import HubScene
 from app.service.bench import Bench
@@ -22,11 +23,12 @@ from app.service.scene_feed import run_scene
 from app.service.shown import LiveShown
 from app.web import problem
 from app.web.access import Access
-from app.web.guard import LOOPBACK_NAMES, Guard, Reach
+from app.web.guard import LOOPBACK_NAMES, SIGNED_IN, Guard, Reach
 from app.web.problem import NotFoundError
 from app.web.routes import api_router, incidents
 from app.web.socket import serve_client
 from app.web.static import PageFiles, page_folder
+from app.web.urgent import commands_of
 from app.web.viser_proxy import viser_router
 
 
@@ -50,7 +52,9 @@ def create_app(
 
     @app.websocket("/api/ws")
     async def socket(websocket: WebSocket) -> None:
-        await serve_client(websocket, LiveShown(bench), replays, time.monotonic, lambda: bench.motion)
+        person: SignedIn = websocket.scope[SIGNED_IN]
+        commands = commands_of(bench, person.person)
+        await serve_client(websocket, LiveShown(bench), replays, time.monotonic, lambda: bench.motion, commands)
 
     app.include_router(incidents.links)
     if scene is not None:

@@ -16,7 +16,8 @@ from pydantic import TypeAdapter, ValidationError
 
 from app.service.shown import LIVE, Shown
 from app.web.feed import Feed
-from app.web.models import Beat, ClientMessage, GoneMessage, ServerMessage, Subscribe
+from app.web.models import Beat, ClientMessage, GoneMessage, ServerMessage, Subscribe, Urgent, UrgentMessage, UrgentTold
+from app.web.urgent import Commanding, Commands
 
 log = logging.getLogger(__name__)
 
@@ -28,7 +29,7 @@ MAX_REQUEST: Final = 65_536
 MAX_OTHERS: Final = 4
 """Replays that one page hears of at a time; each is worth the work of a feed."""
 _adapter: Final[TypeAdapter[Any]] = TypeAdapter(ServerMessage)
-_from_client: Final[TypeAdapter[Subscribe | Beat]] = TypeAdapter(ClientMessage)
+_from_client: Final[TypeAdapter[Subscribe | Beat | Urgent]] = TypeAdapter(ClientMessage)
 
 
 class Contexts(Protocol):
@@ -54,12 +55,21 @@ class DeadManDesk(Protocol):
 class Client:
     """One page: a feed for each context that it asked for. For one thread.
 
-    ``desk`` says where its beats go now; None: nothing is connected that could move.
+    ``desk`` says where its beats go now; None: nothing is connected that could move. ``commands`` does its STOP.
     """
 
-    def __init__(self, live: Shown, contexts: Contexts, desk: Callable[[], DeadManDesk | None] = lambda: None) -> None:
+    def __init__(
+        self,
+        live: Shown,
+        contexts: Contexts,
+        desk: Callable[[], DeadManDesk | None] = lambda: None,
+        commands: Commands = lambda _wanted: None,
+    ) -> None:
         self._contexts = contexts
         self._desk = desk
+        self._commands = commands
+        self._commanding: set[asyncio.Task[None]] = set()
+        self._told: list[UrgentTold] = []
         self._page: str | None = None
         self._live = Feed(live)
         self._others: dict[str, tuple[Feed, Callable[[], None], Shown]] = {}
@@ -74,8 +84,11 @@ class Client:
         for ctx in list(self._others):
             self._end(ctx)
 
-    def take(self, request: Subscribe | Beat) -> None:
-        """A beat, or what the page wants to hear of a context from now on; nothing of a replay ends it."""
+    def take(self, request: Subscribe | Beat | Urgent) -> None:
+        """A STOP, a beat, or what the page wants to hear of a context from now on; nothing of a replay ends it."""
+        if isinstance(request, Urgent):
+            self._command(request)
+            return
         if isinstance(request, Beat):
             self._page = request.page
             if (desk := self._desk()) is not None:
@@ -86,12 +99,26 @@ class Client:
         if feed is not None:
             feed.subscribe(request.topics, None if request.trace is None else request.trace.query())
 
+    def _command(self, request: Urgent) -> None:
+        """Begin it before anything else; it goes on where the page goes away."""
+        work = self._commands(request)
+        if work is not None:
+            task = asyncio.create_task(self._tell_end(request.number, work))
+            self._commanding.add(task)
+            task.add_done_callback(self._commanding.discard)
+        self._told.append(UrgentTold(number=request.number, taken=work is not None, done=None))
+
+    async def _tell_end(self, number: int, work: Commanding) -> None:
+        self._told.append(UrgentTold(number=number, taken=True, done=await work()))
+
     def hello(self) -> ServerMessage:
         """The first message."""
         return self._live.hello()
 
     def due(self, now_s: float) -> Iterator[ServerMessage]:
         """The messages of this moment, of all contexts."""
+        while self._told:
+            yield UrgentMessage(ctx=LIVE, seq=0, t_ns=0, data=self._told.pop(0))
         yield from self._live.due(now_s)
         for ctx, (feed, _, shown) in list(self._others.items()):
             if self._contexts.shown(ctx) is not shown:  # closed, or opened again since
@@ -128,10 +155,11 @@ async def serve_client(
     contexts: Contexts,
     now_s: Callable[[], float],
     desk: Callable[[], DeadManDesk | None] = lambda: None,
+    commands: Commands = lambda _wanted: None,
 ) -> None:
     """Serve one page until it goes away. The guard has let it in."""
     await socket.accept()
-    client = Client(live, contexts, desk)
+    client = Client(live, contexts, desk, commands)
     tasks = [asyncio.create_task(_tell(socket, client, now_s)), asyncio.create_task(_listen(socket, client))]
     try:
         done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)

@@ -8,13 +8,14 @@ import re
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import canopen
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Error, Page, expect
 
 from tests.e2e.browser import SIZE, signed_in
-from tests.e2e.conftest import Twins
+from tests.e2e.conftest import Twins, site_for
 from tests.e2e.processes import running
 from tests.e2e.test_interoperation import EDS
 from tests.e2e.test_page_quality import AXE
@@ -330,3 +331,58 @@ def test_escape_inside_the_3d_view_stops_what_another_tool_has_moved(foreign: tu
     state(page, "ready_to_switch_on|switch_on_disabled|quick_stop_active")
     stands_still(page)
     page.close()
+
+
+SAVE_MS = 10_000
+SAVES = """() => {
+  for (const blade of [1, 2, 3]) for (const unit of ["pmm", "pmc"]) {
+    fetch(`/api/live/devices/wtg-07/blade-${blade}/${unit}/save`, {
+      method: "POST", headers: { "content-type": "application/json" }, body: "{}",
+    });
+  }
+}"""
+SAVE_REQUEST, CONTROLWORD_REQUEST = b"\x10\x10", b"\x40\x60"
+
+
+class Seen:
+    """When a first request of each kind went to the first axis, in ms since 1970."""
+
+    def __init__(self, network: canopen.Network) -> None:
+        self.at_ms: dict[bytes, float] = {}
+        network.subscribe(0x60B, self.hear)
+
+    def hear(self, _can_id: int, data: bytearray, _t_s: float) -> None:
+        self.at_ms.setdefault(bytes(data[1:3]), time.time() * 1000)
+
+    def until(self, page: Page, request: bytes) -> float:
+        deadline = time.monotonic() + MOVE_MS / 1000
+        while request not in self.at_ms:
+            assert time.monotonic() < deadline, "no such request"
+            page.wait_for_timeout(20)
+        return self.at_ms[request]
+
+
+def test_stop_does_not_wait_for_the_requests_of_its_own_page(browser: Browser, tmp_path: Path) -> None:
+    """A browser has six connections to a server; all of them wait for saves of ten seconds."""
+    slow = [f"eeprom_slow@0s,node={node},save_ms={SAVE_MS}" for node in (1, 2, 3, 11, 12, 13)]
+    faults = [part for fault in slow for part in ("--fault", fault)]
+    with running("twin", "oat", "--can", "socketcand:127.0.0.1:0", "--json", *faults) as twins:
+        address = json.loads(twins.wait_for('"address"'))["address"]
+        network = canopen.Network()
+        network.connect(interface="socketcand", host="127.0.0.1", port=int(address.rsplit(":", 1)[1]), channel="can0")
+        serving = ("--data", str(tmp_path / "data"), "serve", "--port", "0", "--json")
+        with (
+            contextlib.closing(SimpleNamespace(close=network.disconnect)),
+            running(*serving, "--site", str(site_for(address, tmp_path))) as served,
+        ):
+            url = json.loads(served.wait_for('"url"'))["url"]
+            with signed_in(browser, url) as context:
+                page = context.new_page()
+                page.goto(f"{url.split('?')[0]}axis?blade=1&scene=off")
+                expect(page.get_by_test_id("axis-angle")).to_have_text(re.compile(r"\d"))
+                seen = Seen(network)
+                page.evaluate(SAVES)
+                saving_ms = seen.until(page, SAVE_REQUEST)
+                page.get_by_test_id("stop").click()
+                waited_ms = seen.until(page, CONTROLWORD_REQUEST) - saving_ms
+                assert waited_ms < SAVE_MS / 2, "not until the first of them has ended"

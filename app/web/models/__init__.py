@@ -368,6 +368,21 @@ class GoneMessage(_Envelope):
     data: Nothing = Nothing()
 
 
+class UrgentTold(BaseModel):
+    """Of the STOP or FEATHER of that number: first that it is ``taken`` (false: nothing is connected), then its end."""
+
+    number: int
+    taken: bool
+    done: StopDone | None
+
+
+class UrgentMessage(_Envelope):
+    """The answers to a STOP or FEATHER that came over this socket."""
+
+    type: Literal["urgent"] = "urgent"
+    data: UrgentTold
+
+
 ServerMessage = Annotated[
     HelloMessage
     | BenchMessage
@@ -382,7 +397,8 @@ ServerMessage = Annotated[
     | EventMessage
     | TraceMessage
     | CursorMessage
-    | GoneMessage,
+    | GoneMessage
+    | UrgentMessage,
     Field(discriminator="type"),
 ]
 """What the socket sends."""
@@ -420,5 +436,20 @@ class Beat(BaseModel):
     sent_ms: Annotated[float, Field(ge=0, allow_inf_nan=False)]
 
 
-ClientMessage = Annotated[Subscribe | Beat, Field(discriminator="type")]
+class Urgent(BaseModel):
+    """STOP or FEATHER to every axis, or to that of ``device``; ``urgent`` of the same ``number`` answers.
+
+    Here as well as by a request: a browser has six connections to a server, and where each of them waits for the end of
+    something long, a request waits until one is free.
+    """
+
+    model_config = ConfigDict(extra="forbid")
+
+    type: Literal["urgent"]
+    command: Literal["stop", "feather"]
+    number: int
+    device: Annotated[str, Field(max_length=200)] | None = None
+
+
+ClientMessage = Annotated[Subscribe | Beat | Urgent, Field(discriminator="type")]
 """What the socket takes."""

@@ -4838,7 +4838,7 @@ export interface components {
             state: "no-earlier-visit" | "reading" | "ready";
             visit: components["schemas"]["VisitDoc"] | null;
         };
-        ClientMessage: components["schemas"]["Subscribe"] | components["schemas"]["Beat"];
+        ClientMessage: components["schemas"]["Subscribe"] | components["schemas"]["Beat"] | components["schemas"]["Urgent"];
         /**
          * ColumnDoc
          * @description What stands above a column. ``t_ns`` null: of no time, as defaults; ``twin`` null: nothing says what it is of.
@@ -9460,7 +9460,7 @@ export interface components {
             /** Unit */
             unit: string;
         };
-        ServerMessage: components["schemas"]["HelloMessage"] | components["schemas"]["BenchMessage"] | components["schemas"]["HeartbeatMessage"] | components["schemas"]["LinkMessage"] | components["schemas"]["NodesMessage"] | components["schemas"]["AxesMessage"] | components["schemas"]["RotorMessage"] | components["schemas"]["InstructorMessage"] | components["schemas"]["MotionMessage"] | components["schemas"]["ValuesMessage"] | components["schemas"]["EventMessage"] | components["schemas"]["TraceMessage"] | components["schemas"]["CursorMessage"] | components["schemas"]["GoneMessage"];
+        ServerMessage: components["schemas"]["HelloMessage"] | components["schemas"]["BenchMessage"] | components["schemas"]["HeartbeatMessage"] | components["schemas"]["LinkMessage"] | components["schemas"]["NodesMessage"] | components["schemas"]["AxesMessage"] | components["schemas"]["RotorMessage"] | components["schemas"]["InstructorMessage"] | components["schemas"]["MotionMessage"] | components["schemas"]["ValuesMessage"] | components["schemas"]["EventMessage"] | components["schemas"]["TraceMessage"] | components["schemas"]["CursorMessage"] | components["schemas"]["GoneMessage"] | components["schemas"]["UrgentMessage"];
         /**
          * Session
          * @description Who is served, and in which languages. ``user`` is null where a launch token opened the session.
@@ -10820,6 +10820,70 @@ export interface components {
          * @enum {string}
          */
         Unsearched: "no_index" | "broken" | "live" | "not_fitting";
+        /**
+         * Urgent
+         * @description STOP or FEATHER to every axis, or to that of ``device``; ``urgent`` of the same ``number`` answers.
+         *
+         *     Here as well as by a request: a browser has six connections to a server, and where each of them waits for the end of
+         *     something long, a request waits until one is free.
+         */
+        Urgent: {
+            /**
+             * Command
+             * @enum {string}
+             */
+            command: "stop" | "feather";
+            /**
+             * Device
+             * @default null
+             */
+            device: string | null;
+            /** Number */
+            number: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            type: "urgent";
+        };
+        /**
+         * UrgentMessage
+         * @description The answers to a STOP or FEATHER that came over this socket.
+         */
+        UrgentMessage: {
+            /**
+             * Ctx
+             * @default live
+             */
+            ctx: string;
+            data: components["schemas"]["UrgentTold"];
+            /** Seq */
+            seq: number;
+            /** T Ns */
+            t_ns: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            type: "urgent";
+            /**
+             * V
+             * @default 1
+             * @constant
+             */
+            v: 1;
+        };
+        /**
+         * UrgentTold
+         * @description Of the STOP or FEATHER of that number: first that it is ``taken`` (false: nothing is connected), then its end.
+         */
+        UrgentTold: {
+            done: components["schemas"]["StopDone"] | null;
+            /** Number */
+            number: number;
+            /** Taken */
+            taken: boolean;
+        };
         /**
          * UserChange
          * @description What is to change; null stays as it is. Another password or ``disabled`` ends the user's sessions.

@@ -1,9 +1,8 @@
 /** STOP and FEATHER: sent at once, to every axis; "sent" until the drive confirms. */
 import { useMutation } from "@tanstack/react-query";
 import { useEffect } from "react";
-import { commands } from "../api/client";
 import type { StopResult } from "../api/types";
-import { liveStore } from "../live/live";
+import { liveStore, sendUrgent } from "../live/live";
 import { mayMove } from "../live/axis";
 import { type Translate, useTexts } from "../texts/texts";
 import { useDeviceName } from "../ui/devices";
@@ -19,7 +18,7 @@ export function useHalt(halt: Halt) {
   const t = useTexts();
   const nameOf = useDeviceName();
   return useMutation({
-    mutationFn: () => (halt === Halt.Stop ? commands.stop() : commands.feather()),
+    mutationFn: () => sendUrgent({ command: halt }),
     onSuccess: (result) => {
       const confirmed = result.axes.length > 0 && result.axes.every((axis) => axis.confirmed_t_ns !== null);
       const failed = result.axes.some((axis) => axis.how === "failed");

@@ -14,10 +14,12 @@ import {
   useSyncExternalStore,
 } from "react";
 import type { TraceFilter } from "../api/trace";
+import type { StopResult } from "../api/types";
 import { Channel, contextOf, LIVE } from "./channel";
 import type { TraceView } from "./frames";
-import { type Beat, LiveSocket } from "./socket";
+import { type Beat, LiveSocket, type Urgent } from "./socket";
 import type { Cell, LiveStore } from "./store";
+import { commandBy } from "./urgent";
 
 const HIDDEN_TICK_MS = 250;
 
@@ -42,6 +44,11 @@ export function startLive(): void {
 /** Say that this page holds an axis, or that it does not; false where the socket is not open. */
 export function sendBeat(beat: Beat): boolean {
   return socket?.beat(beat) ?? false;
+}
+
+/** STOP or FEATHER, by the quickest way there is. */
+export function sendUrgent(urgent: Urgent): Promise<StopResult> {
+  return commandBy((one) => socket?.command(one) ?? null, urgent);
 }
 
 /** A channel for a recording, or the bench's where none is named. */

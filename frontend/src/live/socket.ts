@@ -5,6 +5,7 @@
 import { signedOut } from "../api/client";
 import type { components } from "../api/generated";
 import type { ServerMessage } from "../api/types";
+import { Asked, type Command } from "./asked";
 import { Backoff } from "./backoff";
 import { DeafnessTimer } from "./deafness";
 import type { Channel } from "./channel";
@@ -12,6 +13,9 @@ import type { Channel } from "./channel";
 /** What a page with the lease says: that it is there, and whether its person holds what moves an axis. */
 export type Beat = Omit<Schemas["Beat"], "type">;
 type Schemas = components["schemas"];
+
+/** STOP or FEATHER, to every axis or that of one device. */
+export type Urgent = Pick<Schemas["Urgent"], "command"> & { device?: string };
 
 const CHECK_MS = 100;
 const GIVE_UP_MS = 3000;
@@ -28,6 +32,7 @@ export class LiveSocket {
   private openedMs = 0;
   private retry: ReturnType<typeof setTimeout> | null = null;
   private lastHeardWallMs: number | null = null;
+  private readonly urgent = new Asked();
 
   constructor(url: string, live: Channel) {
     this.url = url;
@@ -79,6 +84,7 @@ export class LiveSocket {
     const message = JSON.parse(text) as ServerMessage;
     const channel = this.channels.get(message.ctx);
     if (message.type === "gone") channel?.tellGone();
+    else if (message.type === "urgent") this.urgent.told(message.data);
     else if (message.type === "trace") channel?.frames.take(message.data, performance.now());
     else channel?.store.apply(message);
     const { store } = this.live;
@@ -88,6 +94,7 @@ export class LiveSocket {
   private lost(socket: WebSocket): void {
     if (socket !== this.socket) return;
     this.socket = null;
+    this.urgent.lost();
     this.retry ??= setTimeout(() => this.connect(), this.backoff.next());
   }
 
@@ -112,6 +119,12 @@ export class LiveSocket {
   /** The dead man; false where the socket is not open. */
   beat(beat: Beat): boolean {
     return this.say({ type: "beat", ...beat });
+  }
+
+  /** STOP or FEATHER ahead of all requests; null where the socket is not open. */
+  command(urgent: Urgent): Command | null {
+    const [number, command] = this.urgent.ask();
+    return this.say({ type: "urgent", number, ...urgent }) ? command : null;
   }
 
   private say(request: object): boolean {

@@ -1,7 +1,7 @@
 import { Button } from "@mantine/core";
 import { useMutation } from "@tanstack/react-query";
-import { commands } from "../../api/client";
 import { moving } from "../../api/motion";
+import { sendUrgent } from "../../live/live";
 import { Control, holding, useControl } from "../../motion/lease";
 import motion from "../../motion/Motion.module.css";
 import { OrderProblem } from "../../motion/OrderProblem";
@@ -14,7 +14,7 @@ export function EndSection({ device, title }: { device: string; title: string })
   const { motion: line, state } = useControl();
   const reset = useOrder();
   const halt = useMutation({ mutationFn: () => moving.halt(device, holding.fence ?? 0) });
-  const stop = useMutation({ mutationFn: () => commands.stopOne(device) });
+  const stop = useMutation({ mutationFn: () => sendUrgent({ command: "stop", device }) });
   const own = state === Control.Own;
   return (
     <section aria-label={title}>

@@ -1,0 +1,76 @@
+import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
+import { Asked } from "./asked";
+import { commandBy, TAKEN_MS } from "./urgent";
+
+const OVER_SOCKET = { axes: [] };
+const BY_REQUEST = { axes: [] };
+const STOP = { command: "stop" } as const;
+
+describe("STOP", () => {
+  beforeEach(() => {
+    vi.useFakeTimers();
+  });
+  afterEach(() => {
+    vi.useRealTimers();
+  });
+
+  it("goes over the socket, and no request is made of it", async () => {
+    const asked = new Asked();
+    const request = vi.fn();
+    const answer = commandBy(() => asked.ask()[1], STOP, request);
+    asked.told({ number: 1, taken: true, done: null });
+    await vi.advanceTimersByTimeAsync(10 * TAKEN_MS);
+    asked.told({ number: 1, taken: true, done: OVER_SOCKET });
+    expect(await answer).toBe(OVER_SOCKET);
+    expect(request).not.toHaveBeenCalled();
+  });
+
+  it("is a request at once where the socket is not open", async () => {
+    const request = vi.fn().mockResolvedValue(BY_REQUEST);
+    expect(await commandBy(() => null, STOP, request)).toBe(BY_REQUEST);
+    expect(request).toHaveBeenCalledWith(STOP);
+  });
+
+  it("is a request as well where the server says nothing, and the first answer counts", async () => {
+    const asked = new Asked();
+    const request = vi.fn().mockReturnValue(new Promise(() => undefined));
+    const answer = commandBy(() => asked.ask()[1], STOP, request);
+    await vi.advanceTimersByTimeAsync(TAKEN_MS - 1);
+    expect(request).not.toHaveBeenCalled();
+    await vi.advanceTimersByTimeAsync(1);
+    expect(request).toHaveBeenCalledTimes(1);
+    asked.told({ number: 1, taken: true, done: OVER_SOCKET });
+    expect(await answer).toBe(OVER_SOCKET);
+  });
+
+  it("is a request where the socket is lost, or nothing is connected", async () => {
+    for (const end of [
+      (asked: Asked) => asked.lost(),
+      (asked: Asked) => asked.told({ number: 1, taken: false, done: null }),
+    ]) {
+      const asked = new Asked();
+      const request = vi.fn().mockResolvedValue(BY_REQUEST);
+      const answer = commandBy(() => asked.ask()[1], STOP, request);
+      end(asked);
+      expect(await answer).toBe(BY_REQUEST);
+    }
+  });
+
+  it("says what the request says where both fail", async () => {
+    const asked = new Asked();
+    const request = vi.fn().mockRejectedValue(new Error("refused"));
+    const answer = commandBy(() => asked.ask()[1], STOP, request);
+    asked.lost();
+    await expect(answer).rejects.toThrow("refused");
+  });
+
+  it("that was taken when the socket was lost is sent once more", async () => {
+    const asked = new Asked();
+    const request = vi.fn().mockResolvedValue(BY_REQUEST);
+    const answer = commandBy(() => asked.ask()[1], STOP, request);
+    asked.told({ number: 1, taken: true, done: null });
+    await vi.advanceTimersByTimeAsync(0);
+    asked.lost();
+    expect(await answer).toBe(BY_REQUEST);
+  });
+});
