@@ -13,7 +13,8 @@ const LEFT_PX = 64;
 const MARGIN = 0.06;
 /** What hardly changes is not blown up: half the axis spans this share of it at least. */
 const FLAT = 0.005;
-const LEAST = 1e-6;
+/** What is finer than any object resolves is noise of the computation; its labels would not fit either. */
+const LEAST = 1e-3;
 /** So many points at most are dots as well. */
 const DOTS = 3000;
 const DOT_PX = 2;
