@@ -91,6 +91,12 @@ async def test_the_timeline_shows_the_fault_and_the_load(server: Server) -> None
     trips = (await server.client.get(f"/api/recordings/{NAME}.mcap/trips")).json()
     assert len(trips["trips"]) == 1
     assert "8611" in str(trips)
+    told = [(one["text_key"], one["severity"], one["details"].get("code_hex")) for one in line["marks"]]
+    assert ("event.device_fault_unknown", "error", None) in told, "the statusword is read first"
+    assert ("event.device_fault", "error", "8611h") in told, "603Fh names the reason"
+    assert ("event.device_fault_over", "info", None) in told
+    marked = next(one["t_ns"] for one in line["marks"] if one["text_key"] == "event.device_fault_unknown")
+    assert trips["trips"][0]["t0_ns"] == marked
 
 
 async def test_the_trace_names_device_function_and_objects(server: Server) -> None:
