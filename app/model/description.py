@@ -350,6 +350,11 @@ class Entry:
         """True for what is saved and can be set: no counters, no process values."""
         return self.saved and self.restore is not RestoreClass.NEVER
 
+    @property
+    def limited_by_variant(self) -> bool:
+        """True where variants of the device have limits of their own."""
+        return any(one.minimum is not None or one.maximum is not None for one in self.variants.values())
+
     def proves(self, fact: Fact) -> bool:
         """True where the device's own manual prints the fact."""
         return not self.inferred or (bool(self.unproven) and fact not in self.unproven)
