@@ -286,8 +286,8 @@ class Entry:
 
     ``enumeration_rule``, ``bits_rule`` and ``limits_rule`` replace ``enumeration``, ``bits`` and the limits while the
     object that they name is known. A raw value is a multiple of ``step``, or one of ``only`` where that is not empty.
-    ``signals`` are the numbers that a telegram of process data knows it by, and ``tool_name`` the name that the maker's
-    own tool gives it.
+    ``ipv4`` marks an address of the internet, its first number in the highest byte. ``signals`` are the numbers that a
+    telegram of process data knows it by, and ``tool_name`` the name that the maker's own tool gives it.
     """
 
     address: Address
@@ -321,6 +321,7 @@ class Entry:
     pdo_side: PdoSide | None = None
     timeout_s: float | None = None
     hexadecimal: bool = False
+    ipv4: bool = False
     node_id: bool = False
     motion: bool = False
     counts: bool = False
