@@ -65,6 +65,12 @@ async def test_every_read_route_answers(server: Server) -> None:
         assert answer.status_code == 200, (path, answer.text)
 
 
+async def test_a_recording_offers_no_look_at_the_device(server: Server) -> None:
+    await at(server, FAULT_S)
+    (station,) = (await server.client.get(f"{BASE}/turbine")).json()["stations"]
+    assert [(one["slug"], one["verifies"]) for one in station["devices"]] == [(SLUG, False)]
+
+
 async def test_a_series_is_what_the_decoder_says(server: Server) -> None:
     doc = await indexed(server, NAME)
     await at(server, FAULT_S)  # the unit of a position is that of the factors that are known at the cursor
