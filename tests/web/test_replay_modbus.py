@@ -65,6 +65,17 @@ async def test_every_read_route_answers(server: Server) -> None:
         assert answer.status_code == 200, (path, answer.text)
 
 
+async def test_its_adus_are_downloaded_for_wireshark_and_no_can_log_is_made_of_them(server: Server) -> None:
+    path = f"/api/recordings/{NAME}.mcap/export"
+    got = await server.client.get(path, params={"format": "pcapng"})
+    assert got.status_code == 200
+    assert f"{NAME}.pcapng" in got.headers["content-disposition"]
+    assert got.content.startswith(b"\x0a\x0d\x0d\x0a")
+    refused = await server.client.get(path, params={"format": "candump"})
+    assert (refused.status_code, refused.json()["code"]) == (400, "usage")
+    assert "pcapng" in str(refused.json())
+
+
 async def test_a_recording_offers_no_look_at_the_device(server: Server) -> None:
     await at(server, FAULT_S)
     (station,) = (await server.client.get(f"{BASE}/turbine")).json()["stations"]

@@ -5657,7 +5657,7 @@ export interface components {
          * @description A file format.
          * @enum {string}
          */
-        Format: "candump" | "asc" | "blf" | "trc" | "csv" | "mcap";
+        Format: "candump" | "asc" | "blf" | "trc" | "csv" | "pcapng" | "mcap";
         /**
          * FoundDoc
          * @description A device that answered, and where it might belong; null where it does not say.
