@@ -41,9 +41,7 @@ def frames(path: str | Path) -> list[Frame]:
         return list(recording.frames())
 
 
-def test_modbus_goes_to_wireshark_and_not_into_a_log_of_can(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_modbus_goes_to_wireshark_and_not_into_a_log_of_can(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     bench = VISIT.with_name("pd4e-bench.mcap")
     done, _ = run(capsys, "export", bench, "--format", "pcapng", "--output", tmp_path / "bench.pcapng")
     assert (done["frames"], done["channels"]) == (len(frames(bench)), ["lan"])
