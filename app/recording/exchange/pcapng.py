@@ -154,7 +154,7 @@ def _packet(sender: int, receiver: int, identification: int, segment: bytes) -> 
 def _checksum(data: bytes) -> int:
     """RFC 1071: the complement of the sum in ones' complement of words of 16 bits."""
     padded = data + bytes(len(data) % 2)
-    total = sum(struct.unpack(f">{len(padded) // 2}H", padded))
+    total: int = sum(struct.unpack(f">{len(padded) // 2}H", padded))
     while total >> 16:
         total = (total & 0xFFFF) + (total >> 16)
     return ~total & 0xFFFF
