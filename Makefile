@@ -69,6 +69,7 @@ wheel: $(VENV)/.ready frontend/dist/index.html
 # Twins in bulk, as fast as the machine goes; the same scenarios make the same recordings.
 recordings: $(VENV)/.ready
 	$(BIN)/hubside twin record recordings/scenarios/*.toml
+	$(PY) -m tests.recording.make_pd4e
 
 screenshots: setup
 	$(PY) -m tests.e2e.screenshots

@@ -18,7 +18,7 @@ from app.model.description_file import BUILTIN
 from app.recording.cdr import NS
 from app.recording.exchange.anonymise import AnonymiseOrder, anonymise
 from app.recording.exchange.cut import CutOrder, cut
-from app.recording.exchange.formats import Format
+from app.recording.exchange.formats import IMPORTED, Format
 from app.recording.exchange.importing import Imported, ImportOrder, import_file
 from app.recording.exchange.merge import MergeInput, merge
 from app.recording.reader import open_recording
@@ -60,7 +60,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 def _add_import(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser = commands.add_parser("import", help="make recordings of files of other tools")
     parser.add_argument("file", type=Path, nargs="+")
-    parser.add_argument("--format", choices=[one.value for one in Format], help="where the file does not tell")
+    parser.add_argument("--format", choices=[one.value for one in IMPORTED], help="where the file does not tell")
     parser.add_argument("--site", type=Path, help="site file that names the devices on the buses")
     parser.add_argument("--turbine", help="which turbine it is; the import's name where there is no site file")
     parser.add_argument(

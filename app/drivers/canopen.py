@@ -58,6 +58,7 @@ class CanOpenDriver:
     """
 
     ends_when_silent: Final = False
+    ends_with_restart: Final = False
 
     def __init__(
         self,

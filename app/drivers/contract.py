@@ -118,6 +118,10 @@ class Driver(Protocol):
     def ends_when_silent(self) -> bool:
         """Whether ``read_many`` asks no further where a device has fallen silent."""
 
+    @property
+    def ends_with_restart(self) -> bool:
+        """Whether a restart of a device ends the connection to it, which is then opened again."""
+
     async def connect(self, timeout_s: float = 5.0) -> None:
         """Open the bus and listen before anything is sent. Raises BusOpenError."""
 

@@ -69,6 +69,7 @@ class ModbusDriver:
     """The devices of ``config`` as the bus ``bus``. ``stamper`` gives frames their times, ``now`` stamps saves."""
 
     ends_when_silent: Final = True
+    ends_with_restart: Final = True
 
     def __init__(
         self, config: ModbusConfig, stamper: Stamper, bus: str = "modbus0",

@@ -286,8 +286,8 @@ class Entry:
 
     ``enumeration_rule``, ``bits_rule`` and ``limits_rule`` replace ``enumeration``, ``bits`` and the limits while the
     object that they name is known. A raw value is a multiple of ``step``, or one of ``only`` where that is not empty.
-    ``signals`` are the numbers that a telegram of process data knows it by, and ``tool_name`` the name that the maker's
-    own tool gives it.
+    ``ipv4`` marks an address of the internet, its first number in the highest byte. ``signals`` are the numbers that a
+    telegram of process data knows it by, and ``tool_name`` the name that the maker's own tool gives it.
     """
 
     address: Address
@@ -321,6 +321,7 @@ class Entry:
     pdo_side: PdoSide | None = None
     timeout_s: float | None = None
     hexadecimal: bool = False
+    ipv4: bool = False
     node_id: bool = False
     motion: bool = False
     counts: bool = False
@@ -349,6 +350,11 @@ class Entry:
     def is_parameter(self) -> bool:
         """True for what is saved and can be set: no counters, no process values."""
         return self.saved and self.restore is not RestoreClass.NEVER
+
+    @property
+    def limited_by_variant(self) -> bool:
+        """True where variants of the device have limits of their own."""
+        return any(one.minimum is not None or one.maximum is not None for one in self.variants.values())
 
     def proves(self, fact: Fact) -> bool:
         """True where the device's own manual prints the fact."""

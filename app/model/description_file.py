@@ -65,7 +65,7 @@ _ERROR_KEYS: Final = frozenset(("code", "name", "reaction", "aid", "number", "or
 _OWN_KEYS: Final = frozenset(("index", "ind", "pnu", "kind", "subs", "elements"))
 _ROW_KEYS: Final = frozenset(
     "name section group type access pdo default saved save_category unit scale hex unit_from min max enumeration bits "
-    "restore verify requires mirror by_variant note inferred origin timeout_s node_id motion also counts "
+    "restore verify requires mirror by_variant note inferred origin timeout_s node_id motion also counts ipv4 "
     "overwritten_by enumeration_from bits_from limits_from step only signals tool_name".split()
 )
 _NOT_INHERITED_BY_SUB0: Final = _ROW_KEYS - {"section", "group", "saved", "save_category", "inferred", "origin"}
@@ -276,6 +276,7 @@ class _Reader:
             pdo_side=PdoSide(row["pdo"]) if row.get("pdo") in _PDO_SIDES else None,
             timeout_s=None if timeout is None else float(timeout),
             hexadecimal=_bool(row, "hex"),
+            ipv4=_bool(row, "ipv4"),
             node_id=_bool(row, "node_id"),
             motion=_bool(row, "motion"),
             counts=_bool(row, "counts"),

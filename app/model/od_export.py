@@ -184,6 +184,7 @@ def entry_dict(entry: Entry) -> dict[str, Any]:
         "motion": entry.motion,
         "timeout_s": entry.timeout_s,
         "hexadecimal": entry.hexadecimal,
+        "ipv4": entry.ipv4,
         "enumeration_from": _table_rule(entry.enumeration_rule),
         "bits_from": _table_rule(entry.bits_rule),
         "limits_from": _limits_rule(entry.limits_rule),

@@ -11,9 +11,9 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import Final
 
-from app.errors import DescriptionError, SetFileError
+from app.errors import DescriptionError, SetFileError, UsageError
 from app.model.datatypes import Raw
-from app.model.description import Description, Entry
+from app.model.description import Bus, Description, Entry
 from app.model.eds import read_eds
 from app.model.eds.ini import Warnings, decode, parse
 from app.model.eds.numbers import parse_value
@@ -44,6 +44,8 @@ _FATAL: Final = frozenset(
 
 def dump_dcf(parameters: ParameterSet, description: Description, file_name: str | None = None) -> str:
     """The set as a DCF. ``description`` is that of the set. Raises UsageError where it is no CANopen device."""
+    if description.bus is not Bus.CANOPEN:
+        raise UsageError(reason=f"{description.id} is no CANopen device, so there is no DCF of it: take JSON or CSV")
     texts, others = {}, {}
     for address, raw in parameters.values.items():
         entry = description.entries.get(address)

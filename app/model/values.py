@@ -9,6 +9,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
+from ipaddress import AddressValueError, IPv4Address
 
 from app.errors import ValueTypeError
 from app.model.address import Address
@@ -17,6 +18,7 @@ from app.model.description import Description, Entry, LimitRef, Lookup, Quantity
 
 _NUMBER = re.compile(r"^([-+]?[0-9]+(?:[.,][0-9]+)?)\s*((?![eE][-+]?[0-9])[^0-9].*)?$")
 MAX_TEXT = 1000
+_IPV4_MOST = (1 << 32) - 1
 _HEX = re.compile(r"^(?:0x([0-9A-Fa-f]+)|([0-9A-Fa-f]+)h)$")
 
 
@@ -51,11 +53,16 @@ def to_scaled(entry: Entry, raw: Raw, lookup: Lookup) -> Scaled | None:
 
 
 def show(entry: Entry, raw: Raw, lookup: Lookup) -> str:
-    """Text of a value, without unit: decimals as the scale has them, hexadecimal where the manual uses it."""
+    """Text of a value, without unit: decimals as the scale has them, hexadecimal where the manual uses it.
+
+    An address of the internet is four numbers, 192.168.2.20.
+    """
     if isinstance(raw, str):
         return raw
     if isinstance(raw, bytes):
         return raw.hex(" ")
+    if entry.ipv4 and isinstance(raw, int) and 0 <= raw <= _IPV4_MOST:
+        return str(IPv4Address(raw))
     if (entry.hexadecimal or entry.bits is not None) and isinstance(raw, int) and entry.type.size:
         return f"{raw & (1 << 8 * entry.type.size) - 1:0{2 * entry.type.size}X}h"
     quantity = quantity_of(entry, lookup)
@@ -70,8 +77,9 @@ def show(entry: Entry, raw: Raw, lookup: Lookup) -> str:
 def parse(description: Description, entry: Entry, text: str, lookup: Lookup) -> Raw:
     """Read what a person typed: ``49.5``, ``49,5 °C``, ``0x1F``, ``1Fh``, ``raw:495`` or the name of an enumeration.
 
-    Hexadecimal and ``raw:`` are raw values, other numbers are scaled. Raises ValueTypeError where the text does not fit
-    the type, where the unit is another one, or where the number lies between two raw values.
+    An address of the internet is four numbers, ``192.168.2.20``. Hexadecimal and ``raw:`` are raw values, other numbers
+    are scaled. Raises ValueTypeError where the text does not fit the type, where the unit is another one, or where the
+    number lies between two raw values.
     """
     text = text.strip()
     if len(text) > MAX_TEXT:
@@ -80,7 +88,7 @@ def parse(description: Description, entry: Entry, text: str, lookup: Lookup) -> 
         return text
     if not entry.type.is_integer and entry.type.bits is None:
         return _octets(entry, text)
-    for reader in (_raw_number, _named):
+    for reader in (_ipv4, _raw_number, _named):
         raw = reader(description, entry, text)
         if raw is not None:
             return raw
@@ -109,6 +117,16 @@ def _raw_number(_description: Description, entry: Entry, text: str) -> int | Non
     if entry.type.is_signed and bits is not None and number >> bits - 1 == 1:
         number -= 1 << bits
     return number
+
+
+def _ipv4(_description: Description, entry: Entry, text: str) -> int | None:
+    """Four numbers with points between; whatever has a point is meant so."""
+    if not entry.ipv4 or "." not in text:
+        return None
+    try:
+        return int(IPv4Address(text))
+    except AddressValueError as error:
+        raise _misfit(entry, text, "an address such as 192.168.2.20 is expected") from error
 
 
 def _named(description: Description, entry: Entry, text: str) -> int | None:

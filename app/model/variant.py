@@ -23,6 +23,12 @@ def as_variant(description: Description, variant: str) -> Description:
     return replace(description, entries=entries, name=name, match=match)
 
 
+def as_identified(description: Description, device_name: str | None, product_code: int | None) -> Description:
+    """The description of the variant that a device says it is; as it stands where that is not clear."""
+    variant = variant_of(description, device_name, product_code)
+    return description if variant is None else as_variant(description, variant)
+
+
 def variant_of(description: Description, device_name: str | None, product_code: int | None) -> str | None:
     """The only variant that a device which says so of itself can be; None where that is not clear."""
     found = [one.id for one in description.variant_details.values() if _fits(one.match, device_name, product_code)]

@@ -13,6 +13,7 @@ from app.model.datatypes import Raw, decode_raw
 from app.model.description import Description, Entry
 from app.model.sets import IDENTITY, Identity, identity_of
 from app.model.site import Device
+from app.model.variant import variant_of
 from app.service.gate import OPEN, Gate
 from app.wire.live import LiveState
 
@@ -45,6 +46,14 @@ class Target:
         if view is None or view.reading is None or entry is None:
             return None
         return decode(entry, view.reading.data)
+
+    @property
+    def variant(self) -> str | None:
+        """Which variant of its description the device is, by what the wire has shown; None where that is not clear."""
+        if not self.description.variants:
+            return None
+        who = who_is(self)
+        return variant_of(self.description, who.device_name, who.product_code)
 
     async def pass_gate(self, driver: Driver, address: Address | None = None) -> None:
         """Raises RestoreOpenError where a restore of the device is not finished, DeviceBusyError where it is in use.

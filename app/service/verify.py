@@ -10,8 +10,10 @@ from typing import Protocol, runtime_checkable
 from app.drivers.contract import Driver
 from app.errors import UsageError
 from app.model.address import Address
+from app.service.connection import Connection
 from app.service.devices import Target
 from app.service.journal import Journal, Kind
+from app.service.stage import Stage
 
 
 class Finding(Protocol):
@@ -49,6 +51,13 @@ class Verified:
     t_ns: int
     objects: int
     findings: tuple[Finding, ...]
+
+
+def verifiable(stage: Stage) -> frozenset[str]:
+    """Slugs of the devices that can be verified: over a bus that gives their dictionary; in a recording none."""
+    if not isinstance(stage, Connection):
+        return frozenset()
+    return frozenset(target.slug for target in stage.targets if isinstance(stage.driver(target), Verifies))
 
 
 async def verify(driver: Driver, target: Target, journal: Journal, now_ns: Callable[[], int]) -> Verified:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 from app.drivers.contract import Driver, Written
 from app.errors import (
@@ -19,10 +20,13 @@ from app.model.address import Address
 from app.model.checks import Allow, check_write
 from app.model.datatypes import Raw, encode_raw
 from app.model.description import Entry, Verify
+from app.model.sets import IDENTITY
 from app.model.values import depends_on, parse, show
 from app.service.address_change import require_confirmed
 from app.service.devices import Target, decode
 from app.service.journal import Journal, Kind
+
+_VARIANT: Final = (IDENTITY["device_name"], IDENTITY["product_code"])
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,7 +125,7 @@ async def _checked(driver: Driver, target: Target, entry: Entry, raw: Raw, allow
     What was seen may be older than an answer that a caller already has: frames reach the live state a little later.
     """
     try:
-        return check_write(target.description, entry, raw, target.lookup, allow=allow)
+        return check_write(target.description, entry, raw, target.lookup, allow=allow, variant=target.variant)
     except (LimitError, PreconditionError):
         rests_on = [address for address in depends_on(entry) if address in target.description.entries]
         if not rests_on:
@@ -129,13 +133,22 @@ async def _checked(driver: Driver, target: Target, entry: Entry, raw: Raw, allow
         answers = await driver.read_many(target.node, rests_on)
         asked = {a: decode(target.entry(a), answer) for a, answer in answers.items() if isinstance(answer, bytes)}
         return check_write(
-            target.description, entry, raw, lambda address: asked.get(address, target.lookup(address)), allow=allow
+            target.description,
+            entry,
+            raw,
+            lambda address: asked.get(address, target.lookup(address)),
+            allow=allow,
+            variant=target.variant,
         )
 
 
 async def know_what_it_rests_on(driver: Driver, target: Target, entry: Entry) -> None:
-    """Read the objects that unit, limits and preconditions rest on and that nobody has seen yet."""
-    unknown = [a for a in depends_on(entry) if a in target.description.entries and target.lookup(a) is None]
+    """Read the objects that unit, limits and preconditions rest on and that nobody has seen yet.
+
+    Where limits are those of a variant, what tells the variant is among them.
+    """
+    rests_on = (*depends_on(entry), *(_VARIANT if entry.limited_by_variant else ()))
+    unknown = [a for a in rests_on if a in target.description.entries and target.lookup(a) is None]
     if unknown:
         await driver.read_many(target.node, unknown)
 

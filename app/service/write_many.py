@@ -225,7 +225,8 @@ async def _check_all(rows: Sequence[Row], allow: Allow) -> None:
         try:
             await target.pass_gate(change.driver, change.address)
             require_confirmed(target, target.entry(change.address), allow)
-            check_write(target.description, target.entry(change.address), change.raw, lookup, allow=allow)
+            entry, variant = target.entry(change.address), target.variant
+            check_write(target.description, entry, change.raw, lookup, allow=allow, variant=variant)
         except HubsideError as error:
             row.state, row.error = RowState.REFUSED, error
         else:

@@ -10,7 +10,7 @@ from typing import Any, Final, NamedTuple
 from app.model.description import Description
 from app.wire.emcy import NO_ERROR, emcy_text_key
 from app.wire.modbus.functions import exception_text_key
-from app.wire.records import EmcySeen, Outcome, SdoAccess, SdoSeen, TransactionSeen
+from app.wire.records import EmcySeen, FaultSeen, Outcome, SdoAccess, SdoSeen, TransactionSeen
 from app.wire.sdo import Abort, abort_text_key
 
 
@@ -22,6 +22,9 @@ class EventKind(Enum):
     NMT_COMMAND = "nmt_command"
     EMCY = "emcy"
     EMCY_RESET = "emcy_reset"
+    DEVICE_FAULT = "device_fault"
+    """A device that sends no emergency messages shows an error, by its statusword or its error code."""
+    DEVICE_FAULT_OVER = "device_fault_over"
     SDO_ABORTED = "sdo_aborted"
     SDO_LOST = "sdo_lost"
     SDO_BROKEN = "sdo_broken"
@@ -175,3 +178,19 @@ def tell_emcy(seen: EmcySeen, description: Description | None) -> Told:
     if seen.code == NO_ERROR:
         return Told(EventKind.EMCY_RESET, Severity.INFO, EventKind.EMCY_RESET.text_key, details)
     return Told(EventKind.EMCY, Severity.ERROR, EventKind.EMCY.text_key, details)
+
+
+def tell_fault(seen: FaultSeen, description: Description | None) -> Told:
+    """A fault of a device without emergency messages; the code of an error without the state Fault is a warning."""
+    if seen.over:
+        return Told(EventKind.DEVICE_FAULT_OVER, Severity.INFO, EventKind.DEVICE_FAULT_OVER.text_key, {})
+    kind = EventKind.DEVICE_FAULT
+    if not seen.code:
+        return Told(kind, Severity.ERROR, f"{kind.text_key}_unknown", {})
+    known = None if description is None else description.errors.get(seen.code)
+    details = {
+        "code": seen.code,
+        "code_hex": f"{seen.code:04X}h",
+        "reason_key": emcy_text_key(seen.code) if known is None else known.text_key,
+    }
+    return Told(kind, Severity.WARNING if seen.fault is False else Severity.ERROR, kind.text_key, details)

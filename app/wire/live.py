@@ -14,7 +14,17 @@ from typing import Any, Final, NamedTuple
 from app.model.address import Address
 from app.model.description import Description
 from app.wire import sdo
-from app.wire.events import Event, EventKind, EventLog, Severity, Told, tell_emcy, tell_sdo, tell_transaction
+from app.wire.events import (
+    Event,
+    EventKind,
+    EventLog,
+    Severity,
+    Told,
+    tell_emcy,
+    tell_fault,
+    tell_sdo,
+    tell_transaction,
+)
 from app.wire.frame import Direction
 from app.wire.live_node import LiveNode, NodeView
 from app.wire.memory import Cell, Reading, Stored
@@ -24,6 +34,7 @@ from app.wire.records import (
     DiagnosisSeen,
     EmcySeen,
     EnvironmentSeen,
+    FaultSeen,
     GapSeen,
     LoadSeen,
     MalformedAduSeen,
@@ -115,6 +126,7 @@ class LiveState:
             MalformedSeen: self._on_malformed,
             TransactionSeen: self._on_transaction,
             RestartSeen: self._on_restart,
+            FaultSeen: self._on_fault,
             MalformedAduSeen: self._on_malformed_adu,
             SlaveSeen: self._on_slave,
             DiagnosisSeen: self._on_diagnosis,
@@ -428,6 +440,10 @@ class LiveState:
         self._see(node)
         self._touch_node(node)
         self._tell(node, seen.t_ns, EventKind.BOOT_UP, Severity.INFO, boots=node.boots)
+
+    def _on_fault(self, seen: FaultSeen) -> None:
+        description = self._node(seen.bus, seen.node).memory.description
+        self._add_event(seen.t_ns, seen.bus, seen.node, tell_fault(seen, description))
 
     def _on_malformed_adu(self, seen: MalformedAduSeen) -> None:
         details = {"fault_key": seen.fault.text_key, "offset": seen.offset, "link": seen.link, "data": seen.data.hex()}

@@ -278,6 +278,25 @@ class RestartSeen(NamedTuple):
     node: int
 
 
+class FaultSeen(NamedTuple):
+    """A device that sends no emergency messages shows a fault or a warning, its reason, or that it is over.
+
+    ``fault``: its statusword tells that the axis is in Fault; None where that was not seen. ``code`` is the error code
+    that it holds, 0 where it holds none or that was not seen yet.
+    """
+
+    t_ns: int
+    bus: str
+    node: int
+    fault: bool | None
+    code: int
+
+    @property
+    def over(self) -> bool:
+        """Nothing is wrong any more."""
+        return not self.fault and not self.code
+
+
 class MalformedAduSeen(NamedTuple):
     """A Modbus ADU or a PROFIBUS telegram makes no sense from its byte ``offset`` on.
 
@@ -342,6 +361,7 @@ Record = (
     | MalformedSeen
     | TransactionSeen
     | RestartSeen
+    | FaultSeen
     | MalformedAduSeen
     | SlaveSeen
     | DiagnosisSeen

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 from pathlib import Path
 
 import pytest
 
 from app.cli.main import main
 from app.recording.index import index_path
+from tests.recording.make_pd4e import SAMPLE
 from tests.service.analysis.rig import look, scenario, the_trip
 
 
@@ -72,3 +74,24 @@ def test_a_folder_is_searched_and_what_has_no_index_is_told_or_gets_one(
 def test_a_signature_that_is_not_understood_names_the_character(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["search", "60F4 > > 2"]) == 2
     assert "at character 8 (>)" in capsys.readouterr().err
+
+
+def test_a_recording_of_modbus_is_searched_by_levels_and_its_trip_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / SAMPLE.name
+    shutil.copy(SAMPLE, path)
+    data = ["--data", str(tmp_path / "data")]
+    assert main([*data, "index", str(path)]) == 0
+    capsys.readouterr()
+
+    def found(text: str) -> int:
+        assert main(["--json", *data, "search", text, str(path)]) == 0
+        return len(capsys.readouterr().out.splitlines())
+
+    assert found("6064 > 700 deg on node 1") == 1, "one stretch at two turns"
+    assert found("6064 > 730 deg") == 0
+    assert found("60F4 < -20 deg within 1 s before axis_fault") == 1, "the shaft blocks on the way back"
+    assert found("60F4 > 20 deg within 1 s before axis_fault") == 0
+    assert main(["--json", *data, "trips", str(path)]) == 0
+    assert "axis_fault" in capsys.readouterr().out

@@ -41,6 +41,17 @@ def frames(path: str | Path) -> list[Frame]:
         return list(recording.frames())
 
 
+def test_modbus_goes_to_wireshark_and_not_into_a_log_of_can(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    bench = VISIT.with_name("pd4e-bench.mcap")
+    done, _ = run(capsys, "export", bench, "--format", "pcapng", "--output", tmp_path / "bench.pcapng")
+    assert (done["frames"], done["channels"]) == (len(frames(bench)), ["lan"])
+    assert (tmp_path / "bench.pcapng").stat().st_size > 100 * done["frames"]
+    for form in ("candump", "asc", "blf", "trc", "csv"):
+        assert main(["export", str(bench), "--format", form, "--output", str(tmp_path / "none"), "--json"]) == 2
+        assert "take pcapng" in capsys.readouterr().err
+    assert not (tmp_path / "none").exists()
+
+
 def test_there_and_back_again(part: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     done, said = run(capsys, "export", part, "--format", "candump", "--exact", "--output", tmp_path / "visit.log")
     assert "attachments stay behind" in said

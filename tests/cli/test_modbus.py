@@ -25,6 +25,7 @@ from tests.e2e.processes import hubside, running
 
 WINDOW = "6065"
 NOBODY = "127.0.0.1:9"
+_WITH_ACTIONS = ("sets", "motors", "pdo")
 
 
 @dataclass
@@ -38,7 +39,9 @@ class Bench:
     def __call__(self, command: str, *words: object, at: str | None = None) -> tuple[int, Any, str]:
         """Exit code, the last result, and what was said."""
         where = ("--modbus", at or self.peer.server, "--listen-s", "0.1")
-        code = main(["--data", str(self.data), command, *where, *map(str, words), "--json"])
+        action = [str(words[0])] if command in _WITH_ACTIONS else []
+        rest = map(str, words[len(action) :])
+        code = main(["--data", str(self.data), command, *action, *where, *rest, "--json"])
         told = self.capsys.readouterr()
         lines = told.out.strip().splitlines()
         return code, json.loads(lines[-1]) if lines else None, told.err
@@ -117,6 +120,54 @@ def test_read_write_backup_and_recording(bench: Bench) -> None:
     (file,) = (bench.data / "recordings").glob("*.mcap")
     with open_recording(file, strict=True) as recording:
         assert len(list(recording.frames())) > 4
+
+
+def test_a_set_goes_out_and_comes_back_and_a_data_sheet_of_can_is_refused(bench: Bench) -> None:
+    code, told, _ = bench("backup")
+    kept = load_set(Path(told["file"]).read_text(encoding="utf-8"), "set")
+
+    def sets(*words: object) -> tuple[int, str]:
+        code = main(["--data", str(bench.data), "sets", *map(str, words), "--json"])
+        return code, bench.capsys.readouterr().err
+
+    for form in ("json", "csv"):
+        file = bench.data / f"servo.{form}"
+        assert sets("export", kept.hash[:12], "--format", form, "--output", file)[0] == 0
+        assert sets("import", file)[0] == 0
+    code, said = sets("export", kept.hash[:12], "--format", "dcf", "--output", bench.data / "servo.dcf")
+    assert code == 2 and "take JSON or CSV" in said
+    assert not (bench.data / "servo.dcf").exists()
+    assert main(["--data", str(bench.data), "sets", "list", "--json"]) == 0
+    listed = json.loads(bench.capsys.readouterr().out)
+    assert [one["hash"] for one in listed] == [kept.hash], "what came back is the same set"
+
+
+def test_a_set_is_checked_compared_and_restored(bench: Bench) -> None:
+    code, told, _ = bench("backup")
+    file = told["file"]
+    assert bench("sets", "check")[0] == 0
+    assert bench("sets", "diff", file, "live:1")[0] == 0
+    assert bench("write", 1, WINDOW, "raw:300")[0] == 0
+    code, told, _ = bench("sets", "diff", file, "live:1")
+    assert (code, [row["address"] for row in told["rows"]]) == (1, [WINDOW])
+    code, told, _ = bench("restore", file, "--plan")
+    assert code == 0 and told["result"] is None
+    assert [step["kind"] for step in told["plan"]["steps"]] == ["write", "confirm", "save", "prove"]
+    assert bench("sets", "diff", file, "live:1")[0] == 1, "a plan writes nothing"
+    code, told, _ = bench("restore", file, "--yes", "--restart")
+    assert (code, told["result"]["end"], told["result"]["proven"]) == (0, "new", True)
+    assert bench("sets", "diff", file, "live:1")[0] == 0
+
+
+def test_what_the_drive_has_not_is_refused_with_the_reason(bench: Bench) -> None:
+    example = "0197a000-0000-7000-8000-00000000e003"
+    for words, why in (
+        (("motors", "apply", example, "--device", 1, "--plan"), "no motor"),
+        (("motors", "compare", example, "--device", 1), "no motor"),
+        (("pdo", "show", 1), "no PDOs"),
+    ):
+        code, _, said = bench(words[0], *words[1:])
+        assert (code, why in said) == (2, True), said
 
 
 def test_record_alone_would_hold_nothing_and_is_refused(bench: Bench) -> None:

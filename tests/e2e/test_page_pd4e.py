@@ -77,6 +77,8 @@ def test_a_drive_is_prepared_moved_stopped_homed_and_its_fault_reset(
         "external-stop",
     ):
         expect(page.get_by_test_id(lacking)).to_have_count(0)
+    for drawn in ("position", "velocity", "torque"):
+        expect(page.get_by_test_id(f"plot-{drawn}").locator("canvas")).to_be_visible()
     for there in ("bits-6041", "bits-6040", "bits-60FD", "bits-60FE:01", "routing-3252", "history-SERVO"):
         expect(page.get_by_test_id(there)).to_be_visible()
 

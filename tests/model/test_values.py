@@ -69,6 +69,22 @@ def test_what_does_not_fit_is_told(toy: Description, address: Address, text: str
     assert reason in caught.value.details["reason"]
 
 
+@pytest.mark.parametrize(
+    ("address", "text", "raw"),
+    [("2011", "192.168.2.20", 0xC0A80214), ("2012", "255.255.255.0", 0xFFFFFF00), ("2016", "0.0.0.0", 0)],
+)
+def test_an_address_of_the_internet_is_four_numbers(address: str, text: str, raw: int) -> None:
+    pd4e = load_builtin("nanotec-pd4e")
+    entry = pd4e.entry(parse_address(address))
+    assert show(entry, raw, knows()) == text
+    assert parse(pd4e, entry, text, knows()) == raw
+    assert parse(pd4e, entry, f"{raw:X}h", knows()) == raw
+    for wrong in ("192.168.2", "192.168.2.256", "1.2.3.4.5", "1.2.3.x"):
+        with pytest.raises(ValueTypeError) as caught:
+            parse(pd4e, entry, wrong, knows())
+        assert "192.168.2.20" in caught.value.details["reason"]
+
+
 def test_a_position_follows_the_feed_constant(toy: Description) -> None:
     entry = toy.entry(OFFSET)
     assert show(entry, 9000, knows()) == "90.00", "the default until the feed constant is known"

@@ -1,4 +1,4 @@
-"""Makes ``recordings/pd4e-bench.mcap``: ``python -m tests.recording.make_pd4e``.
+"""Makes ``recordings/scenarios/pd4e-bench.mcap``: ``python -m tests.recording.make_pd4e``.
 
 The twin of a PD4-E and a master in simulated time, so that the same program makes the same file: the whole dictionary,
 a motion, a shaft that blocks until the drive reports a following error, the reset, and the way back.
@@ -35,7 +35,7 @@ from app.wire.modbus.requests import (
     WriteObject,
 )
 
-SAMPLE: Final = Path(__file__).resolve().parents[2] / "recordings" / "pd4e-bench.mcap"
+SAMPLE: Final = Path(__file__).resolve().parents[2] / "recordings" / "scenarios" / "pd4e-bench.mcap"
 BUS: Final = "lan"
 TURBINE: Final = "bench-pd4e"
 SLUG: Final = "bench-pd4e/bench/servo"

@@ -21,7 +21,7 @@ from mcap_ros2.writer import Writer
 from app.errors import ForeignFileError, RecordingError, UsageError
 from app.recording.content import EventKind
 from app.recording.exchange.exporting import Choice, export, losses
-from app.recording.exchange.formats import SUFFIXES, Format, Head, Lost, Style, detect, held, lost_parts
+from app.recording.exchange.formats import IMPORTED, SUFFIXES, Format, Head, Lost, Style, detect, held, lost_parts
 from app.recording.exchange.importing import Imported, ImportOrder, Wall, import_file, read_foreign
 from app.recording.exchange.lines import Notes, Other
 from app.recording.reader import open_recording
@@ -29,7 +29,7 @@ from app.recording.schemas import CAN_FRAME
 from app.wire.frame import Adu, Can, Direction, Frame
 from tests.recording.rig import MS, START_NS, S, frames_of, record
 
-FOREIGN = [form for form in Format if form is not Format.MCAP]
+FOREIGN = [form for form in IMPORTED if form is not Format.MCAP]
 WAYS = [(form, style) for form in FOREIGN for style in Style]
 VISIT = Path(__file__).resolve().parents[2] / "recordings" / "scenarios" / "7-service-visit.mcap"
 
@@ -234,7 +234,7 @@ def test_one_bus_alone_can_be_exported(tmp_path: Path) -> None:
     source = record(tmp_path, PLAIN)
     with open_recording(source) as recording:
         done = export(recording, tmp_path / "one.log", Choice(Format.CANDUMP, buses=["can1"]))
-        with pytest.raises(UsageError, match="no CAN bus 'can9'"):
+        with pytest.raises(UsageError, match="no bus 'can9'"):
             export(recording, tmp_path / "none.log", Choice(Format.CANDUMP, buses=["can9"]))
     assert (done.frames, done.channels) == (2, ("can1",))
     assert (tmp_path / "one.log").read_text().count(" can1 ") == 2

@@ -22,7 +22,7 @@ from app.service.jobs import Job, RowState
 from app.service.journal import Kind
 from app.service.options import Options
 from app.service.polling import Rate, usual_list
-from app.service.verify import verify
+from app.service.verify import verifiable, verify
 from app.service.views import node_lines
 from app.service.write import write_raw
 from app.service.write_many import Change, OnFailure, Order, prepare, write_many
@@ -112,6 +112,7 @@ async def test_the_twin_is_as_it_is_described_and_a_drive_that_is_not_is_told(
     servo: tuple[Connection, Target],
 ) -> None:
     connection, target = servo
+    assert verifiable(connection) == {target.slug}
     done = await verify(connection.driver(target), target, connection.journal, connection.stamper)
     assert done.objects == len(target.description.entries)
     # Nothing but the categories in which it has nothing to save, which it says itself.

@@ -65,6 +65,23 @@ async def test_every_read_route_answers(server: Server) -> None:
         assert answer.status_code == 200, (path, answer.text)
 
 
+async def test_its_adus_are_downloaded_for_wireshark_and_no_can_log_is_made_of_them(server: Server) -> None:
+    path = f"/api/recordings/{NAME}.mcap/export"
+    got = await server.client.get(path, params={"format": "pcapng"})
+    assert got.status_code == 200
+    assert f"{NAME}.pcapng" in got.headers["content-disposition"]
+    assert got.content.startswith(b"\x0a\x0d\x0d\x0a")
+    refused = await server.client.get(path, params={"format": "candump"})
+    assert (refused.status_code, refused.json()["code"]) == (400, "usage")
+    assert "pcapng" in str(refused.json())
+
+
+async def test_a_recording_offers_no_look_at_the_device(server: Server) -> None:
+    await at(server, FAULT_S)
+    (station,) = (await server.client.get(f"{BASE}/turbine")).json()["stations"]
+    assert [(one["slug"], one["verifies"]) for one in station["devices"]] == [(SLUG, False)]
+
+
 async def test_a_series_is_what_the_decoder_says(server: Server) -> None:
     doc = await indexed(server, NAME)
     await at(server, FAULT_S)  # the unit of a position is that of the factors that are known at the cursor
@@ -91,6 +108,12 @@ async def test_the_timeline_shows_the_fault_and_the_load(server: Server) -> None
     trips = (await server.client.get(f"/api/recordings/{NAME}.mcap/trips")).json()
     assert len(trips["trips"]) == 1
     assert "8611" in str(trips)
+    told = [(one["text_key"], one["severity"], one["details"].get("code_hex")) for one in line["marks"]]
+    assert ("event.device_fault_unknown", "error", None) in told, "the statusword is read first"
+    assert ("event.device_fault", "error", "8611h") in told, "603Fh names the reason"
+    assert ("event.device_fault_over", "info", None) in told
+    marked = next(one["t_ns"] for one in line["marks"] if one["text_key"] == "event.device_fault_unknown")
+    assert trips["trips"][0]["t0_ns"] == marked
 
 
 async def test_the_trace_names_device_function_and_objects(server: Server) -> None:

@@ -38,7 +38,9 @@ async def test_session_texts_turbine_and_descriptions(server: Server) -> None:
     assert (await server.client.get("/api/texts/fr")).status_code == 422
     turbine = (await server.client.get("/api/live/turbine")).json()
     assert turbine["slug"] == "wtg-07"
-    assert [device["node"] for station in turbine["stations"] for device in station["devices"]] == [1, 11, 2, 12, 3, 13]
+    devices = [device for station in turbine["stations"] for device in station["devices"]]
+    assert [device["node"] for device in devices] == [1, 11, 2, 12, 3, 13]
+    assert not any(device["verifies"] for device in devices), "CAN gives no list of a device's objects"
     described = (await server.client.get("/api/live/descriptions/oat-pmm")).json()
     assert any(entry["address"] == LIMIT for entry in described["entries"])
     assert (await server.client.get("/api/live/descriptions/nothing")).status_code == 404

@@ -20,6 +20,7 @@ KEYS = (
     abort_text_key(0),
     *(f"emcy.{code:04x}" for code in emcy.ERROR_CLASSES),
     "emcy.unknown",
+    "event.device_fault_unknown",
     "event.malformed_adu",
     *(item.text_key for enum in (NmtState, NmtCommand, Fault, EventKind) for item in enum),
 )

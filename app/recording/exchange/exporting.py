@@ -1,4 +1,7 @@
-"""Writes the CAN frames of a recording in a format of others, and tells before what that format cannot hold."""
+"""Writes the frames of a recording in a format of others, and tells before what that format cannot hold.
+
+pcapng takes ADUs of Modbus TCP, all others take CAN frames.
+"""
 
 from __future__ import annotations
 
@@ -9,19 +12,23 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from app.errors import RecordingError, UsageError
-from app.recording.content import METADATA_BIT_RATES
+from app.recording.content import METADATA_BIT_RATES, METADATA_SERVERS
 from app.recording.exchange.asc import asc_lines
 from app.recording.exchange.blf import write_blf
 from app.recording.exchange.candump import candump_lines
 from app.recording.exchange.csv_lines import csv_lines
 from app.recording.exchange.draft import drafted
 from app.recording.exchange.formats import Format, Head, Loss, Lost, Style, held, lost_parts
+from app.recording.exchange.pcapng import write_pcapng
 from app.recording.exchange.trc import trc_lines
+from app.recording.node_table import read_servers
 from app.recording.reader import Recording
-from app.recording.schemas import CAN_FRAME, CLOCK_TOPIC, EVENTS_TOPIC, STATE_TOPIC
+from app.recording.schemas import CAN_FRAME, CLOCK_TOPIC, EVENTS_TOPIC, STATE_TOPIC, TELEGRAM, MessageType
 from app.wire.frame import Frame
 
 _TOLD_EVERY: Final = 10_000
+_HOLDS: Final = {False: ("ADUs of Modbus TCP", "pcapng"), True: ("CAN frames", "candump, asc, blf, trc or csv")}
+"""What a format cannot hold, and which one can; True: of pcapng."""
 _LINES: Final[dict[Format, Callable[[Head, Iterable[Frame], Style], Iterator[str]]]] = {
     Format.CANDUMP: candump_lines,
     Format.ASC: asc_lines,
@@ -72,12 +79,22 @@ def losses(recording: Recording, choice: Choice) -> tuple[Loss, ...]:
 
 def can_buses(recording: Recording) -> tuple[str, ...]:
     """The CAN buses of which there are messages, in the order of their topics."""
+    return _buses_of(recording, CAN_FRAME)
+
+
+def adu_buses(recording: Recording) -> tuple[str, ...]:
+    """The buses of Modbus TCP of which there are messages."""
+    with_servers = {bus for bus, _ in read_servers(recording.metadata.get(METADATA_SERVERS, {}))}
+    return tuple(bus for bus in _buses_of(recording, TELEGRAM) if bus in with_servers)
+
+
+def _buses_of(recording: Recording, message: MessageType) -> tuple[str, ...]:
     counts = recording.topics
     names = [
         channel.topic[1:]
         for channel in recording.channels.values()
         if channel.schema_id in recording.schemas
-        and recording.schemas[channel.schema_id].name == CAN_FRAME.name
+        and recording.schemas[channel.schema_id].name == message.name
         and counts.get(channel.topic)
     ]
     return tuple(dict.fromkeys(names))
@@ -103,12 +120,18 @@ def export(
 
 
 def _buses(recording: Recording, choice: Choice) -> tuple[str, ...]:
-    there = can_buses(recording)
+    there, others = can_buses(recording), adu_buses(recording)
+    if choice.into is Format.PCAPNG:
+        there, others = others, there
+    if others and not there:
+        holds, better = _HOLDS[choice.into is Format.PCAPNG]
+        raise UsageError(reason=f"{choice.into.value} cannot hold {holds}, and there is nothing else: take {better}")
     if choice.buses is None:
         return there
     for bus in choice.buses:
         if bus not in there:
-            raise UsageError(reason=f"no CAN bus '{bus}' in it (there are: {', '.join(there) or 'none'})")
+            known = ", ".join(there) or "none"
+            raise UsageError(reason=f"no bus '{bus}' in it that {choice.into.value} can hold (there are: {known})")
     return tuple(bus for bus in there if bus in choice.buses)
 
 
@@ -124,7 +147,9 @@ def _write(
     head = Head(first_ns, buses, {bus: int(table[bus]) for bus in buses if table.get(bus, "").isdecimal()})
     counter = _Counter(on_frames)
     frames = counter(chosen_frames(recording, choice), choice)
-    if choice.into is Format.BLF:
+    if choice.into is Format.PCAPNG:
+        write_pcapng(path, head, frames)
+    elif choice.into is Format.BLF:
         write_blf(path, head, frames)
     else:
         with path.open("x", encoding="utf-8", newline="") as file:

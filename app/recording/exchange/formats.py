@@ -16,11 +16,12 @@ from typing import Final, NamedTuple
 from app.errors import UsageError
 from app.recording.cdr import MAX_DATA, MAX_T_NS, make_can
 from app.recording.summary import MAGIC
-from app.wire.frame import Can, Direction, Frame
+from app.wire.frame import Adu, Can, Direction, Frame
 
 US: Final = 1_000
 MAX_STANDARD_ID: Final = 0x7FF
 MAX_BIT_RATE: Final = 1_000_000
+_PCAPNG_MAGIC: Final = b"\x0a\x0d\x0d\x0a"
 ONE_BUS: Final = "can0"
 """What a bus is called where the file does not say."""
 
@@ -33,6 +34,7 @@ class Format(Enum):
     BLF = "blf"
     TRC = "trc"
     CSV = "csv"
+    PCAPNG = "pcapng"
     MCAP = "mcap"
 
 
@@ -53,8 +55,13 @@ SUFFIXES: Final = {
     Format.BLF: ".blf",
     Format.TRC: ".trc",
     Format.CSV: ".csv",
+    Format.PCAPNG: ".pcapng",
     Format.MCAP: ".mcap",
 }
+
+
+IMPORTED: Final = tuple(one for one in Format if one is not Format.PCAPNG)
+"""What is read, too. Of segments on a network ADUs would have to be put together first: pcapng is written only."""
 
 
 class Lost(Enum):
@@ -127,6 +134,8 @@ def detect(path: Path, name: str | None = None) -> Format:
         raise UsageError(reason=f"{path}: {error.strerror or error}") from error
     if begin.startswith(MAGIC):
         return Format.MCAP
+    if begin.startswith(_PCAPNG_MAGIC):
+        return Format.PCAPNG
     if begin.startswith(b"LOGG"):
         return Format.BLF
     found = _by_text(begin.decode("utf-8", "replace"))
@@ -157,6 +166,8 @@ def held(frame: Frame, into: Format, style: Style = Style.COMMON) -> Frame | Non
     can = frame.payload
     if into is Format.MCAP:
         return frame._replace(t_adapter_ns=None)
+    if into is Format.PCAPNG:
+        return frame._replace(t_adapter_ns=None) if isinstance(can, Adu) else None
     if not isinstance(can, Can):
         return None
     exact = style is Style.EXACT

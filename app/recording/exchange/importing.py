@@ -26,7 +26,7 @@ from app.recording.exchange.blf import BlfReader
 from app.recording.exchange.candump import CandumpParser
 from app.recording.exchange.csv_lines import CsvParser
 from app.recording.exchange.draft import drafted, free_name
-from app.recording.exchange.formats import Format, detect
+from app.recording.exchange.formats import IMPORTED, Format, detect
 from app.recording.exchange.lines import LineParser, Notes, read_lines
 from app.recording.exchange.origin import OriginKind, Source, origin_table, source_of
 from app.recording.exchange.tape import Subject, Tape, Taped
@@ -123,6 +123,8 @@ def import_file(
     """
     name = plain_name(path.name if name is None else name)
     form = order.form or detect(path, name)
+    if form not in IMPORTED:
+        raise UsageError(reason=f"{name}: {form.value} is written here, and not read")
     try:
         found = Imported(source_of(path, form.value)._replace(file=name), path.stat().st_mtime_ns)
         folder.mkdir(parents=True, exist_ok=True)

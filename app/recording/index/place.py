@@ -14,7 +14,7 @@ from typing import Final
 from app.model.bundled import bundled_folder
 
 SUFFIX: Final = ".index"
-SCHEMA: Final = 2
+SCHEMA: Final = 3
 """Raised with every change of what an index holds or how."""
 _ENDS_BYTES: Final = 1 << 16
 _NAME_AT_MOST: Final = 50

@@ -17,7 +17,7 @@ from app.model.set_head import Taking
 from app.model.set_import import read_set_file
 from app.model.set_record import SetRecord, Tag
 from app.model.sets import Origin, ParameterSet, iso_time
-from app.model.variant import as_variant, variant_of
+from app.model.variant import as_identified
 from app.service.compare.ground import Ground
 from app.service.compare.known import Known, defaults_of, ram_of, stored_of
 from app.service.compare.spec import ColumnKind, ColumnSpec, Unresolved, parse_moment, parse_spec
@@ -154,8 +154,9 @@ class Columns:
         """With the defaults of the variant that is connected there; what rests on the variant is open else."""
         target = self.ground.target(spec.of)
         identity = None if target is None else who_is(target)
-        variant = None if identity is None else variant_of(description, identity.device_name, identity.product_code)
-        return description if variant is None else as_variant(description, variant)
+        if identity is None:
+            return description
+        return as_identified(description, identity.device_name, identity.product_code)
 
     # -- sets -----------------------------------------------------------------------
 

@@ -21,7 +21,7 @@ from app.errors import (
 from app.model.address import Address
 from app.model.checks import Allow
 from app.model.datatypes import Raw
-from app.model.description import Bus, RestoreClass
+from app.model.description import RestoreClass
 from app.model.restore.plan import Step, StepKind
 from app.model.saving import Category, command_of, has_categories
 from app.model.station import Place, StationValues
@@ -362,8 +362,8 @@ class Hands:
             known["proven"] = took.proven
         self._log.ended(StepState.DONE, **known)
         self._boots[slug] = max(before + 1, boots_of(target))
-        if target.description.bus is Bus.MODBUS_TCP:
-            bus = target.device.bus  # its connection does not outlive the restart that we asked for
+        if driver.ends_with_restart:
+            bus = target.device.bus  # by the restart that we asked for
             self._reconnects[bus] = self.connection.buses[bus].status.reconnects
 
     async def prove(

@@ -16,6 +16,7 @@ from app.model.description import Description
 from app.model.restore.wanted import DeviceState
 from app.model.sets import ParameterSet
 from app.model.station import StationValues, station_of
+from app.model.variant import as_identified
 from app.service.backup import DeviceProgress, ReadReport, read_device, readable, to_set
 from app.service.connection import Connection
 from app.service.devices import Target
@@ -64,10 +65,15 @@ async def survey(
     return Survey(
         reports,
         sets,
-        station_of((sets[target.slug], target.description) for target in targets),
+        station_of((one, _as_variant(target, one)) for target in targets for one in (sets[target.slug],)),
         {report.target.slug: state_of(report) for report in reports},
         boots,
     )
+
+
+def _as_variant(target: Target, found: ParameterSet) -> Description:
+    """The description with the limits of the variant that the device has shown to be."""
+    return as_identified(target.description, found.identity.device_name, found.identity.product_code)
 
 
 async def read_whole(

@@ -11,6 +11,7 @@ from app.model.description import Description, Entry, Kind
 from app.model.values import quantity_of, show
 from app.service.devices import Target, decode
 from app.wire.emcy import NO_ERROR, emcy_text_key
+from app.wire.events import tell_fault
 from app.wire.frame import Adu, Can, Frame
 from app.wire.modbus.functions import exception_text_key
 from app.wire.modbus.transactions import ARROW
@@ -18,6 +19,7 @@ from app.wire.records import (
     BootUpSeen,
     EmcySeen,
     EnvironmentSeen,
+    FaultSeen,
     GapSeen,
     MalformedAduSeen,
     MalformedSeen,
@@ -313,6 +315,11 @@ def _restart(_seen: RestartSeen, _row: TraceRow, _namer: Namer) -> _Notes:
     yield TraceNote("trace.note.restart", {})
 
 
+def _fault(seen: FaultSeen, _row: TraceRow, namer: Namer) -> _Notes:
+    told = tell_fault(seen, namer.description(seen.bus, seen.node))
+    yield TraceNote(told.text_key, told.details)
+
+
 _NOTES: Final[Mapping[type, Callable[[Any, TraceRow, Namer], _Notes]]] = {
     EmcySeen: _emcy,
     EnvironmentSeen: _environment,
@@ -325,6 +332,7 @@ _NOTES: Final[Mapping[type, Callable[[Any, TraceRow, Namer], _Notes]]] = {
     MalformedAduSeen: _malformed_adu,
     OrphanSeen: _orphan,
     RestartSeen: _restart,
+    FaultSeen: _fault,
     SdoSeen: _sdo,
     TransactionSeen: _transaction,
 }

@@ -52,13 +52,17 @@ class Session(BaseModel):
 
 
 class DeviceRef(BaseModel):
-    """One device: ``slug`` is its whole path, ``axis`` tells whether it has a controlword."""
+    """One device: ``slug`` is its whole path, ``axis`` tells whether it has a controlword.
+
+    ``verifies``: its description can be held against it now, for its bus gives the list of its objects.
+    """
 
     slug: str
     node: int
     description_id: str
     name: str
     axis: bool
+    verifies: bool
 
 
 class StationRef(BaseModel):

@@ -11,6 +11,7 @@ from app.model.roles import Role
 from app.service.shown import LiveShown, Shown
 from app.service.stage import Stage
 from app.service.stop import is_axis
+from app.service.verify import verifiable
 from app.web.deps import BenchOf, PersonOf, ShownOf, StageOf, needs, reads_both
 from app.web.models import BusRef, ConnectRequest, DeviceRef, KnownTurbine, Nothing, StationRef, Turbine
 from app.web.problem import NotFoundError
@@ -64,7 +65,7 @@ async def turbine(shown: ShownOf) -> Turbine | None:
 
 def _turbine(shown: Shown, stage: Stage) -> Turbine:
     site, axes = stage.turbine, {target.slug for target in stage.targets if is_axis(target)}
-    link = shown.link()
+    link, verifies = shown.link(), verifiable(stage)
     adapter = next((bus.connection for bus in site.buses if bus.name == link.bus), "")
     stations = [
         StationRef(
@@ -78,6 +79,7 @@ def _turbine(shown: Shown, stage: Stage) -> Turbine:
                     description_id=one.description_id,
                     name=one.name,
                     axis=one.slug in axes,
+                    verifies=one.slug in verifies,
                 )
                 for one in station.devices
             ],

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 from app.model.address import Address
+from app.wire.modbus.faults import FaultWatch
 from app.wire.modbus.image import (
     RX_MAPPING,
     RX_REGISTER,
@@ -44,12 +45,14 @@ class DeviceWatch:
         self._told_to_boot: frozenset[str] | None = None
         """The clients that were seen before it was told to, and who told it."""
         self._registers: tuple[int, int, tuple[int, ...]] | None = None
+        self._faults = FaultWatch()
 
     def forget(self) -> None:
         """Frames are missing, or it has restarted: any mapping may be in force. The order of words is its nature."""
         self.received.forget()
         self.sent.forget()
         self._registers = None
+        self._faults.forget()
 
     def asked(self, request: Request, client: str) -> None:
         """A request was sent to it."""
@@ -84,16 +87,22 @@ class DeviceWatch:
         self._registers = (t_ns, start, registers)
 
     def learn(self, t_ns: int, bus: str, records: list[Record]) -> Sequence[Record]:
-        """Take what ``records`` tell; returns them, with a restart before them where they show one."""
+        """Take what ``records`` tell; gives them, with a restart before them where they show one, and faults behind."""
         restart: Sequence[Record] = ()
-        for record in records:
-            if isinstance(record, ValueSeen) and record.source in (Source.SDO_READ, Source.SDO_WRITE):
+        values = [record for record in records if isinstance(record, ValueSeen)]
+        for record in values:
+            if record.source in (Source.SDO_READ, Source.SDO_WRITE):
                 if record.address == UPTIME and record.source is Source.SDO_READ:
                     restart = self._learn_uptime(t_ns, bus, int.from_bytes(record.data, "little")) or restart
                 self._learn_order(t_ns, record)
                 if not self.received.learn(record.address, record.data):
                     self.sent.learn(record.address, record.data)
-        return (*restart, *records) if restart else records
+        faults = [
+            fault
+            for value in values
+            if value.source in (Source.SDO_READ, Source.PDO_TX) and (fault := self._faults.see(value)) is not None
+        ]
+        return (*restart, *records, *faults) if restart or faults else records
 
     def _learn_uptime(self, t_ns: int, bus: str, uptime_s: int) -> Sequence[Record]:
         before, self._uptime = self._uptime, (uptime_s, t_ns)
@@ -139,6 +148,7 @@ class DeviceWatch:
             "clients": list(self._clients),
             "told_to_boot": None if self._told_to_boot is None else sorted(self._told_to_boot),
             "registers": self._registers,
+            "faults": self._faults.snapshot(),
         }
 
     def restore(self, state: Mapping[str, Any]) -> None:
@@ -151,6 +161,9 @@ class DeviceWatch:
         self._told_to_boot = None if state["told_to_boot"] is None else frozenset(state["told_to_boot"])
         read = state["registers"]
         self._registers = None if read is None else (read[0], read[1], tuple(read[2]))
+        self._faults = FaultWatch()
+        if "faults" in state:  # keyframes of earlier recordings have none
+            self._faults.restore(state["faults"])
 
 
 def _tells_to_boot(request: Request) -> bool:

@@ -8,8 +8,10 @@ type Schemas = components["schemas"];
 export type ExchangeJob = Schemas["ExchangeJob"];
 export type LossDoc = Schemas["LossDoc"];
 
-export const FORMATS = ["candump", "asc", "blf", "trc", "csv", "mcap"] as const;
+export const FORMATS = ["candump", "asc", "blf", "trc", "csv", "pcapng", "mcap"] as const;
 export type Format = (typeof FORMATS)[number];
+/** What is read, too. */
+export const IMPORTED: readonly Format[] = FORMATS.filter((one) => one !== "pcapng");
 
 const LOOK_AGAIN_MS = 300;
 const pathOf = (name: string) => `/api/recordings/${encodeURIComponent(name)}`;

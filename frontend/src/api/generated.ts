@@ -5154,6 +5154,8 @@ export interface components {
         /**
          * DeviceRef
          * @description One device: ``slug`` is its whole path, ``axis`` tells whether it has a controlword.
+         *
+         *     ``verifies``: its description can be held against it now, for its bus gives the list of its objects.
          */
         DeviceRef: {
             /** Axis */
@@ -5166,6 +5168,8 @@ export interface components {
             node: number;
             /** Slug */
             slug: string;
+            /** Verifies */
+            verifies: boolean;
         };
         /**
          * DraftIn
@@ -5653,7 +5657,7 @@ export interface components {
          * @description A file format.
          * @enum {string}
          */
-        Format: "candump" | "asc" | "blf" | "trc" | "csv" | "mcap";
+        Format: "candump" | "asc" | "blf" | "trc" | "csv" | "pcapng" | "mcap";
         /**
          * FoundDoc
          * @description A device that answered, and where it might belong; null where it does not say.

@@ -111,6 +111,8 @@ export interface EntryDoc extends QuantityDoc {
   /** A write can set an axis in motion. */
   motion: boolean;
   hexadecimal: boolean;
+  /** An address of the internet, its first number in the highest byte. */
+  ipv4: boolean;
 }
 
 export interface BitDoc {

@@ -58,6 +58,8 @@ export class LiveStore {
   /** Where a recording stands; null for the bench. */
   cursor: CursorData | null = null;
   readonly traces = new Map<number, Trace>();
+  /** Of axes that turn no blade, by their device. */
+  readonly deviceTraces = new Map<string, Trace>();
 
   private readonly devices = new Map<string, Map<string, Cell>>();
   private readonly snapshots = new Map<string, number>();
@@ -166,6 +168,7 @@ export class LiveStore {
     this.axes = new Map();
     this.rotor = null;
     this.traces.clear();
+    this.deviceTraces.clear();
     // The bench goes on after another connection; what a recording tells is told anew from where its cursor stands.
     if (this.recorded) this.events = [];
     for (const topic of ["nodes", "axes", "rotor", "events"]) this.mark(topic);

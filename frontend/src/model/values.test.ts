@@ -40,6 +40,7 @@ const PLAIN: EntryDoc = {
   motion: false,
   also: [],
   hexadecimal: false,
+  ipv4: false,
   pdo: false,
 };
 
@@ -131,6 +132,23 @@ describe("parse", () => {
     expect(raw(PLAIN, "warm")).toEqual({ ok: false, why: Misfit.NoNumber });
     expect(raw(PLAIN, "1.2.3")).toEqual({ ok: false, why: Misfit.Unit });
     expect(raw(PLAIN, "")).toEqual({ ok: false, why: Misfit.Empty });
+  });
+
+  it("shows addresses of the internet as four numbers, and reads them so", () => {
+    const address = of({
+      type: "UNSIGNED32",
+      bit_count: 32,
+      range: [0, 4294967295],
+      hexadecimal: true,
+      ipv4: true,
+    });
+    const open = { ...address, decimals: 0, unit: "", scale: 1, minimum: null, maximum: null };
+    expect(show(open, 3232236052, nothing, "de")).toBe("192.168.2.20");
+    expect(show(open, 0, nothing, "en")).toBe("0.0.0.0");
+    for (const typed of ["192.168.2.20", " 192.168.2.20 ", "C0A80214h", "3232236052"])
+      expect(parse(DOC, open, typed, nothing)).toEqual({ ok: true, raw: 3232236052 });
+    for (const typed of ["192.168.2", "192.168.2.256", "192.168.2.020", "192.168.2.20.1", "a.b.c.d"])
+      expect(parse(DOC, open, typed, nothing)).toEqual({ ok: false, why: Misfit.NoAddress });
   });
 
   it("takes a hexadecimal number as a bit pattern of the type", () => {

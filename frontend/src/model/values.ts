@@ -52,6 +52,7 @@ export function show(entry: EntryDoc, raw: Raw, lookup: Lookup, language: Langua
   if (isOctets(entry)) return octets(String(raw));
   const exact = fraction(String(raw));
   if (isText(entry) || exact === null) return String(raw);
+  if (entry.ipv4) return dotted(Number(raw));
   if (isHex(entry) && isInteger(entry)) return hexadecimal(entry, raw);
   const { scale, decimals } = quantityOf(entry, lookup);
   const scaled = times(exact, scale);
@@ -71,6 +72,11 @@ export function figure(number: number, decimals: number, language: Language): st
 /** A bit rate in kbit/s; a dash where the bus has none of its own, as Ethernet. */
 export const rateText = (bitrate: number, language: Language): string =>
   bitrate > 0 ? figure(bitrate / 1000, 0, language) : "–";
+
+/** The four numbers of an address of the internet, the highest byte first. */
+function dotted(number: number): string {
+  return [24, 16, 8, 0].map((bits) => (number >>> bits) & 0xff).join(".");
+}
 
 export function hexadecimal(entry: EntryDoc, raw: Raw): string {
   const bits = BigInt(Math.max(8, entry.bit_count ?? 8));
@@ -145,6 +151,7 @@ export enum Misfit {
   AboveLimit = "above",
   NotListed = "not_listed",
   NotAscii = "not_ascii",
+  NoAddress = "no_address",
 }
 
 export type Parsed = { ok: true; raw: Raw } | { ok: false; why: Misfit };
@@ -153,14 +160,14 @@ const NUMBER = /^([-+]?\d+(?:[.,]\d+)?)\s*(\D.*)?$/;
 const HEX = /^(?:0x([0-9a-f]+)|([0-9a-f]+)h)$/i;
 const RAW = /^raw:\s*([-+]?\d+|0x[0-9a-f]+)$/i;
 
-/** Reads what a person typed: `49.5`, `49,5 °C`, `0x1F`, `1Fh`, `raw:495`; checks type, resolution and limits. */
+/** Reads what a person typed: `49.5`, `49,5 °C`, `0x1F`, `1Fh`, `raw:495`, `192.168.2.20`; checks type, resolution and limits. */
 export function parse(doc: DescriptionDoc, entry: EntryDoc, typed: string, lookup: Lookup): Parsed {
   const text = typed.trim();
   // eslint-disable-next-line no-control-regex -- a VISIBLE_STRING is ASCII
   if (isText(entry)) return /^[\x00-\x7f]*$/.test(text) ? { ok: true, raw: text } : misfit(Misfit.NotAscii);
   if (text === "") return misfit(Misfit.Empty);
   if (isOctets(entry)) return parseOctets(text);
-  const parsed = rawNumber(entry, text) ?? scaledNumber(entry, text, lookup);
+  const parsed = ipv4(entry, text) ?? rawNumber(entry, text) ?? scaledNumber(entry, text, lookup);
   return parsed.ok ? checkNumber(doc, entry, parsed.raw, lookup) : parsed;
 }
 
@@ -197,6 +204,16 @@ function parseOctets(text: string): Parsed {
   const digits = text.replaceAll(/\s/g, "");
   if (!/^(?:[0-9a-f]{2})+$/i.test(digits)) return misfit(Misfit.NoHex);
   return { ok: true, raw: digits.toLowerCase() };
+}
+
+/** Four numbers with points between; whatever has a point is meant so. */
+function ipv4(entry: EntryDoc, text: string): Parsed | null {
+  if (!entry.ipv4 || !text.includes(".")) return null;
+  const numbers = text.split(".");
+  const fits =
+    numbers.length === 4 && numbers.every((one) => /^(?:0|[1-9]\d{0,2})$/.test(one) && Number(one) < 256);
+  if (!fits) return misfit(Misfit.NoAddress);
+  return { ok: true, raw: numbers.reduce((whole, one) => whole * 256 + Number(one), 0) };
 }
 
 function rawNumber(entry: EntryDoc, text: string): Parsed | null {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 from collections.abc import AsyncIterator
 from io import StringIO
 from pathlib import Path
@@ -20,7 +21,7 @@ from app.service.options import Options
 from app.service.polling import USUAL
 from app.service.scope.captures import Captures
 from app.service.scope.desk import ScopeDesk
-from app.service.scope.export import csv_pieces
+from app.service.scope.export import csv_pieces, json_pieces
 from app.service.scope.line import scope_line
 from app.service.scope.series import each_once
 from app.store.store import Store
@@ -108,6 +109,12 @@ async def test_a_motion_is_caught_with_every_value_that_crossed_the_wire(
     assert rows["6065"].raw == "256"
     table = b"".join(csv_pieces(capture, load_texts("en"))).decode("utf-8-sig")
     assert len(list(csv.reader(StringIO(table)))) == 1 + len(each_once([one.t_ns for one in capture.values]))
+    plain = json.loads(b"".join(json_pieces(capture, list(rows.values()))))
+    assert plain["signals"][0]["unit"] == "°"
+    assert len(plain["in_force"]) == len(rows)
+    for written, values, signal in zip(plain["signals"], capture.values, head.signals, strict=True):
+        assert (written["t_ns"], written["raw"]) == (values.t_ns.tolist(), values.raw.tolist())
+        assert written["scaled"] == pytest.approx((values.raw * float(signal.scale)).tolist())
     await connection.close()
     assert connection.recording is not None
     with open_recording(tmp_path / str(head.recording)) as recording:

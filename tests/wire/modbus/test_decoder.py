@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.model.address import Address
-from app.wire.events import EventKind
+from app.wire.events import EventKind, Severity, tell_fault
 from app.wire.frame import Adu, Direction, Frame
 from app.wire.live import LiveState
 from app.wire.memory import StoredState
@@ -42,6 +42,7 @@ from app.wire.modbus.requests import (
 from app.wire.modbus.transactions import LATE_NS, MAX_OPEN
 from app.wire.records import (
     Fault,
+    FaultSeen,
     GapSeen,
     LoadSeen,
     MalformedAduSeen,
@@ -432,6 +433,59 @@ def test_an_uptime_that_falls_behind_shows_a_restart(decoder: ModbusDecoder, upt
     answer = ObjectRead(UPTIME, uptime_s.to_bytes(4, "little"))
     records = decoder.feed_all(client.at(60_000 * MS).exchange(ReadObject(UPTIME, 4), answer))
     assert (RestartSeen in {type(record) for record in records}) is restarted
+
+
+# -- faults ----------------------------------------------------------------------------
+
+
+def faults(decoder: ModbusDecoder, client: Client, address: int, number: int) -> list[tuple[bool | None, int, bool]]:
+    """What the value of an object tells of a fault."""
+    answer = ObjectRead(Address(address), number.to_bytes(2, "little"))
+    records = decoder.feed_all(client.exchange(ReadObject(Address(address), 2), answer))
+    return [(one.fault, one.code, one.over) for one in records if isinstance(one, FaultSeen)]
+
+
+FINE, FAULT, REACTION = 0x0627, 0x0608, 0x060F
+
+
+def test_a_fault_its_reason_and_its_end_are_told_once_each(decoder: ModbusDecoder) -> None:
+    client = Client()
+    steps = [
+        (0x6041, FINE, []), (0x603F, 0, []),
+        (0x6041, REACTION, [(True, 0, False)]), (0x6041, FAULT, []),
+        (0x603F, 0x8611, [(True, 0x8611, False)]), (0x603F, 0x8611, []), (0x6041, FAULT, []),
+        (0x603F, 0x7121, [(True, 0x7121, False)]),
+        (0x6041, FINE, []), (0x603F, 0, [(False, 0, True)]), (0x603F, 0, []),
+        (0x6041, FAULT, [(True, 0, False)]), (0x6041, FINE, [(False, 0, True)]),
+    ]  # fmt: skip
+    for number, (address, value, told) in enumerate(steps):
+        assert faults(decoder, client, address, value) == told, number
+
+
+def test_a_fault_that_stood_before_is_told_when_it_is_first_seen_and_a_warning_is_none(decoder: ModbusDecoder) -> None:
+    client = Client()
+    assert faults(decoder, client, 0x603F, 0x8611) == [(None, 0x8611, False)]
+    assert faults(decoder, client, 0x6041, FAULT) == [], "it is the same one"
+    restored = ModbusDecoder(BUS, {SERVER: NODE})
+    restored.restore(json.loads(json.dumps(decoder.snapshot())))
+    for one in (decoder, restored):
+        assert faults(one, client, 0x6041, FAULT) == []
+    decoder.gap(client.t_ns, "gap.bus_lost")
+    assert faults(decoder, client, 0x6041, FAULT) == [(True, 0, False)], "nobody knows what was meanwhile"
+    assert faults(restored, client, 0x6041, FINE) == []
+    assert faults(restored, client, 0x603F, 0) == [(False, 0, True)]
+    assert faults(restored, client, 0x603F, 0x8612) == [(False, 0x8612, False)]
+    told = tell_fault(FaultSeen(1, BUS, NODE, False, 0x8612), None)
+    assert (told.severity, told.details["code_hex"]) == (Severity.WARNING, "8612h")
+
+
+def test_a_fault_in_registers_is_told(mapped: ModbusDecoder) -> None:
+    """A master that exchanges nothing but registers never reads 603Fh."""
+    client = Client(OTHER, ours=False)
+    request = ReadRegisters(5000, 1)
+    assert not [r for r in mapped.feed_all(client.exchange(request, RegistersRead((FINE,)))) if type(r) is FaultSeen]
+    records = mapped.feed_all(client.exchange(request, RegistersRead((FAULT,))))
+    assert [one.fault for one in records if isinstance(one, FaultSeen)] == [True]
 
 
 # -- what makes no sense ---------------------------------------------------------------

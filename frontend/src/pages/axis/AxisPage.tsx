@@ -17,7 +17,7 @@ import { BitPanel } from "./BitPanel";
 import { ErrorHistory } from "./ErrorHistory";
 import { Measurements } from "./Measurements";
 import { MotionPanel } from "./MotionPanel";
-import { Plots } from "./Plots";
+import { BladePlots, DevicePlots } from "./Plots";
 import { RecordedNote } from "./RecordedNote";
 import { StateDiagram } from "./StateDiagram";
 
@@ -87,11 +87,13 @@ function Axis({ station }: { station: StationRef }) {
         <h2>{t("page.axis.machine")}</h2>
         <StateDiagram state={now.state} stale={now.stale} />
       </section>
-      {station.blade !== null && (
-        <section className={`${classes.panel} ${classes.plots}`} aria-label={t("page.axis.plots")}>
-          <Plots blade={station.blade} />
-        </section>
-      )}
+      <section className={`${classes.panel} ${classes.plots}`} aria-label={t("page.axis.plots")}>
+        {station.blade !== null ? (
+          <BladePlots blade={station.blade} />
+        ) : (
+          contexts.pmc && <DevicePlots context={contexts.pmc} />
+        )}
+      </section>
       <Measurements {...contexts} />
       <BitPanel title={t("page.axis.statusword")} context={contexts.pmc} address="6041" pace="fast" />
       <BitPanel title={t("page.axis.controlword")} context={contexts.pmc} address="6040" pace="rare" />

@@ -1,13 +1,16 @@
 import "uplot/dist/uPlot.min.css";
 import { Button, SegmentedControl, useComputedColorScheme } from "@mantine/core";
 import { IconPlayerPause, IconPlayerPlay } from "@tabler/icons-react";
-import { useEffect, useRef, useState } from "react";
+import { useCallback, useEffect, useMemo, useRef, useState } from "react";
 import UPlot from "uplot";
 import { usePageSearch } from "../../frame/search";
 import { useStore } from "../../live/live";
-import type { Columns } from "../../live/trace";
-import { localise } from "../../model/values";
+import type { LiveStore } from "../../live/store";
+import type { Columns, Trace } from "../../live/trace";
+import type { DeviceContext } from "../../model/shown";
+import { localise, quantityOf } from "../../model/values";
 import { useTexts } from "../../texts/texts";
+import { drawnOf, traceOf, useDeviceTrace } from "../../ui/deviceTrace";
 import classes from "./Axis.module.css";
 
 const REDRAW_MS = 200;
@@ -35,8 +38,48 @@ const PLOTS: readonly Plot[] = [
   { key: "current", unit: "%", leastSpan: 10, series: [{ of: "currents", colour: "--hs-accent" }] },
 ];
 
+type TraceOf = (store: LiveStore) => Trace | undefined;
+
+export function BladePlots({ blade }: { blade: number }) {
+  const traceIn = useCallback<TraceOf>((store) => store.traces.get(blade), [blade]);
+  return <Plots plots={PLOTS} traceIn={traceIn} />;
+}
+
+const POSITION = PLOTS[0]?.series ?? [];
+const LEAST_SPANS: Record<string, number> = { "°": 4, "°/s": 2, "%": 10 };
+/** Of a unit that is counted in steps: so few are no motion. */
+const LEAST_STEPS = 20;
+
+/** Of an axis that turns no blade: what its device has, in its own units. */
+export function DevicePlots({ context }: { context: DeviceContext }) {
+  useDeviceTrace(context);
+  const { slug, doc, lookup } = context;
+  const traceIn = useCallback<TraceOf>((store) => traceOf(store, slug), [slug]);
+  const drawn = useMemo(() => drawnOf({ ...context, doc }), [context, doc]);
+  const units = [drawn.position, drawn.velocity, drawn.effort].map(
+    (one) => one && quantityOf(one, lookup).unit,
+  );
+  const [positionUnit, velocityUnit, effortUnit] = units;
+  const plots = useMemo(
+    () =>
+      [
+        plotOf("position", positionUnit, POSITION),
+        plotOf("velocity", velocityUnit, [{ of: "velocities", colour: "--hs-accent" }]),
+        plotOf(drawn.effort?.address === "6077" ? "torque" : "current", effortUnit, [
+          { of: "currents", colour: "--hs-accent" },
+        ]),
+      ].filter((one) => one !== null),
+    [positionUnit, velocityUnit, effortUnit, drawn],
+  );
+  return <Plots plots={plots} traceIn={traceIn} />;
+}
+
+function plotOf(key: string, unit: string | undefined, series: Plot["series"]): Plot | null {
+  return unit === undefined ? null : { key, unit, leastSpan: LEAST_SPANS[unit] ?? LEAST_STEPS, series };
+}
+
 /** Angle and demand, velocity and current of the last minutes; paused, the same stretch stays in view. */
-export function Plots({ blade }: { blade: number }) {
+function Plots({ plots, traceIn }: { plots: readonly Plot[]; traceIn: TraceOf }) {
   const t = useTexts();
   const [search, update] = usePageSearch();
   const store = useStore();
@@ -73,8 +116,8 @@ export function Plots({ blade }: { blade: number }) {
           </Button>
         </span>
       </h2>
-      {PLOTS.map((plot) => (
-        <OnePlot key={plot.key} plot={plot} blade={blade} spanS={Number(span)} pausedS={pausedS} />
+      {plots.map((plot) => (
+        <OnePlot key={plot.key} plot={plot} traceIn={traceIn} spanS={Number(span)} pausedS={pausedS} />
       ))}
     </>
   );
@@ -82,12 +125,12 @@ export function Plots({ blade }: { blade: number }) {
 
 interface OnePlotProps {
   plot: Plot;
-  blade: number;
+  traceIn: TraceOf;
   spanS: number;
   pausedS: number | null;
 }
 
-function OnePlot({ plot, blade, spanS, pausedS }: OnePlotProps) {
+function OnePlot({ plot, traceIn, spanS, pausedS }: OnePlotProps) {
   const t = useTexts();
   const { language } = t;
   const store = useStore();
@@ -98,7 +141,7 @@ function OnePlot({ plot, blade, spanS, pausedS }: OnePlotProps) {
     if (!element) return;
     const endS = () => pausedS ?? store.serverNowMs() / 1000;
     const data = (): UPlot.AlignedData => {
-      const found = store.traces.get(blade)?.columns(spanS, endS());
+      const found = traceIn(store)?.columns(spanS, endS());
       return found
         ? [found.times, ...plot.series.map((one) => found[one.of])]
         : [[], ...plot.series.map(() => [])];
@@ -115,7 +158,7 @@ function OnePlot({ plot, blade, spanS, pausedS }: OnePlotProps) {
       observer.disconnect();
       drawn.destroy();
     };
-  }, [plot, blade, store, spanS, pausedS, scheme, language]);
+  }, [plot, traceIn, store, spanS, pausedS, scheme, language]);
   const title = t(`page.axis.plot.${plot.key}`);
   return (
     <figure className={classes.plot}>

@@ -8,6 +8,7 @@ import type { DeviceContext } from "../../model/shown";
 import { useTexts } from "../../texts/texts";
 import { stationName } from "../../ui/devices";
 import { age, errorCode } from "../../ui/format";
+import { useDeviceTrace } from "../../ui/deviceTrace";
 import { ReadingText } from "../../ui/ReadingText";
 import { useDeviceContext, useReading } from "../../ui/reading";
 import { ERROR_CODE, measuredOf, positionOf, STATUSWORD } from "./bench";
@@ -40,6 +41,7 @@ function Device({ device }: { device: DeviceRef }) {
   const t = useTexts();
   useWatchDevice(device.slug);
   const context = useDeviceContext(device);
+  useDeviceTrace(context);
   const position = context && positionOf(context.doc);
   return (
     <section className={classes.benchDevice} aria-label={device.name}>

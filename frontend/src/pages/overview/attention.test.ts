@@ -16,7 +16,7 @@ const turbine: Turbine = {
       slug: "wtg-07/blade-1",
       name: "Blade 1",
       blade: 1,
-      devices: [{ slug: PMC, node: 11, description_id: "oat-pmc", name: "PMC", axis: true }],
+      devices: [{ slug: PMC, node: 11, description_id: "oat-pmc", name: "PMC", axis: true, verifies: false }],
     },
   ],
 };

@@ -1,7 +1,10 @@
 import { Button } from "@mantine/core";
 import { IconDeviceFloppy, IconListCheck, IconRefresh, IconRotateClockwise2 } from "@tabler/icons-react";
+import { useQuery } from "@tanstack/react-query";
 import { useState } from "react";
+import { useTurbineQuery } from "../../api/queries";
 import { useTexts } from "../../texts/texts";
+import { placesOf } from "../../ui/devices";
 import { useBenchOfTable, useDevice } from "./context";
 import { RestartDialog, SaveDialog } from "./DeviceDialogs";
 import classes from "./Parameters.module.css";
@@ -21,6 +24,8 @@ export function DeviceActions() {
   const { role, recorded, side } = useBenchOfTable();
   const { slug, doc } = useDevice();
   const silent = useSilent(slug);
+  const turbine = useQuery(useTurbineQuery()).data;
+  const verifies = placesOf(turbine).some(({ device }) => device.slug === slug && device.verifies);
   const [dialog, setDialog] = useState<Dialog | null>(null);
   const close = () => setDialog(null);
   const barred = recorded || silent || role === "viewer";
@@ -51,7 +56,7 @@ export function DeviceActions() {
           </Button>
         </>
       )}
-      {!side && doc.bus === "modbus-tcp" && (
+      {!side && verifies && (
         <Button
           px="sm"
           variant="default"

@@ -58,12 +58,14 @@ function Exporting({ name }: { name: string }) {
             <span className="dim">{t("page.files.table_means")}</span>
           ) : (
             <>
-              <Checkbox
-                label={t("page.files.exact")}
-                checked={exact}
-                onChange={(event) => setExact(event.currentTarget.checked)}
-                data-testid="export-exact"
-              />
+              {chosen !== "pcapng" && (
+                <Checkbox
+                  label={t("page.files.exact")}
+                  checked={exact}
+                  onChange={(event) => setExact(event.currentTarget.checked)}
+                  data-testid="export-exact"
+                />
+              )}
               <Losses name={name} format={chosen} exact={exact} />
             </>
           )}

@@ -2,7 +2,7 @@ import { Button, Checkbox, FileInput, Select } from "@mantine/core";
 import { IconFileImport } from "@tabler/icons-react";
 import { useMutation, useQuery } from "@tanstack/react-query";
 import { useState } from "react";
-import { exchange, type Format, FORMATS } from "../../api/exchange";
+import { exchange, type Format, IMPORTED } from "../../api/exchange";
 import { knownTurbinesQuery } from "../../api/settings";
 import { NeedsRole } from "../../frame/NeedsRole";
 import { useTexts } from "../../texts/texts";
@@ -75,8 +75,8 @@ function ImportDialog({ onClose }: { onClose: () => void }) {
           label={t("page.files.format")}
           placeholder={t("page.files.by_itself")}
           value={format}
-          onChange={(value) => setFormat(FORMATS.find((one) => one === value) ?? null)}
-          data={FORMATS.map((value) => ({ value, label: t(`page.files.format_of.${value}`) }))}
+          onChange={(value) => setFormat(IMPORTED.find((one) => one === value) ?? null)}
+          data={IMPORTED.map((value) => ({ value, label: t(`page.files.format_of.${value}`) }))}
           clearable
         />
         <Checkbox

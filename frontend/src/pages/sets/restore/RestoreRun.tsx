@@ -135,7 +135,7 @@ function Confirmation({ doc }: { doc: RestoreDoc }) {
       </span>
       <div>
         <strong>{t("page.restoring.confirm.title", { station })}</strong>
-        <div>{t("page.restoring.confirm.explain")}</div>
+        <div>{t("page.restoring.confirm.explain", { station })}</div>
       </div>
       <Decision
         doc={doc}
