@@ -79,6 +79,18 @@ async def test_a_bus_that_is_gone_fails_and_no_connection_is_not_taken(server: S
         assert answer["data"] == {"number": 2, "taken": False, "done": None}
 
 
+async def test_a_command_that_fails_by_a_defect_sends_the_page_another_way(
+    server: Server, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken() -> tuple[()]:
+        raise RuntimeError("broken")
+
+    async with server.socket() as connection:
+        monkeypatch.setattr(server.connection, "axes", broken)
+        _, last = await told(Page(connection), "stop", 1)
+        assert last == {"number": 1, "taken": False, "done": None}
+
+
 @pytest.mark.parametrize("wrong", [{"command": "start"}, {"number": "x"}, {"force": True}])
 async def test_what_is_no_command_closes_the_socket(server: Server, wrong: dict[str, Any]) -> None:
     async with server.socket() as connection:

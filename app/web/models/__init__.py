@@ -373,7 +373,7 @@ class GoneMessage(_Envelope):
 
 
 class UrgentTold(BaseModel):
-    """Of the STOP or FEATHER of that number: first that it is ``taken`` (false: nothing is connected), then its end."""
+    """Of the STOP or FEATHER of that number: first that it is ``taken``, then its end; not taken: ask by a request."""
 
     number: int
     taken: bool

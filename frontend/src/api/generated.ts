@@ -10879,7 +10879,7 @@ export interface components {
         };
         /**
          * UrgentTold
-         * @description Of the STOP or FEATHER of that number: first that it is ``taken`` (false: nothing is connected), then its end.
+         * @description Of the STOP or FEATHER of that number: first that it is ``taken``, then its end; not taken: ask by a request.
          */
         UrgentTold: {
             done: components["schemas"]["StopDone"] | null;

@@ -64,6 +64,15 @@ describe("STOP", () => {
     await expect(answer).rejects.toThrow("refused");
   });
 
+  it("that the server took and then failed at is a request", async () => {
+    const asked = new Asked();
+    const request = vi.fn().mockResolvedValue(BY_REQUEST);
+    const answer = commandBy(() => asked.ask()[1], STOP, request);
+    asked.told({ number: 1, taken: true, done: null });
+    asked.told({ number: 1, taken: false, done: null });
+    expect(await answer).toBe(BY_REQUEST);
+  });
+
   it("that was taken when the socket was lost is sent once more", async () => {
     const asked = new Asked();
     const request = vi.fn().mockResolvedValue(BY_REQUEST);
