@@ -54,12 +54,16 @@ _WARMING_MS: Final = 300_000.0
 
 @dataclass(slots=True)
 class Conditions:
-    """What the drive is exposed to; a test or an operator may change it at any time. ``levels``: inputs 4 and up."""
+    """What the drive is exposed to; a test or an operator may change it at any time. ``levels``: inputs 4 and up.
+
+    ``analogue``: what the converters of the analogue inputs give, digits of 16 bits with a sign.
+    """
 
     supply_mv: int = 48_000
     logic_mv: int = 24_000
     ambient_c: float = _AMBIENT_C
     levels: int = 0
+    analogue: tuple[int, int] = (0, 0)
 
 
 class Drive:

@@ -32,6 +32,7 @@ def connect(device: Pd4e) -> None:
     _motion(device)
     _currents(device)
     _surroundings(device)
+    _analogue(device)
     _ethernet(device)
 
 
@@ -112,6 +113,22 @@ def _surroundings(device: Pd4e) -> None:
     _show(device, 0x4014, 2, lambda: drive.conditions.logic_mv)
     _show(device, 0x4014, 3, lambda: round(drive.temperature_c * 10))
     _show(device, 0x4014, 4, lambda: round(drive.temperature_c * 10))
+
+
+def _analogue(device: Pd4e) -> None:
+    """Digits as they come (3220h), and (digits + 3321h) / 3322h in 3320h (manual, 3321h and 3322h)."""
+    for place in (0, 1):
+        _show(device, 0x3220, place + 1, lambda place=place: device.drive.conditions.analogue[place])  # type: ignore[misc]
+        _show(device, 0x3320, place + 1, lambda place=place: _scaled(device, place))  # type: ignore[misc]
+
+
+def _scaled(device: Pd4e, place: int) -> int:
+    """OPEN how a quotient is rounded and what a divisor of 0 does: towards 0, and as 1."""
+    store = device.store
+    offset, divisor = store.number(0x3321, place + 1), store.number(0x3322, place + 1) or 1
+    number = device.drive.conditions.analogue[place] + offset
+    quotient = abs(number) // abs(divisor)
+    return quotient if (number < 0) == (divisor < 0) else -quotient
 
 
 def _ethernet(device: Pd4e) -> None:

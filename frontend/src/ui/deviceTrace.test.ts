@@ -33,7 +33,7 @@ function bench(values: Record<string, number>, tNs = 100 * SECOND_NS, nowNs = tN
     address,
     { raw, hex: "", t_ns: tNs, source: "poll", stored: null, known: true, stale: false },
   ]);
-  const data = { device: SERVO, full: true, values: Object.fromEntries(cells) };
+  const data = { device: SERVO, full: true, values: Object.fromEntries(cells) as unknown };
   store.apply({ v: 1, ctx: "live", type: "values", seq: 1, t_ns: nowNs, data } as unknown as ServerMessage);
   const context = { slug: SERVO, doc: DOC, lookup: (at: string) => rawAt(store, SERVO, at) };
   return { store, context: context as unknown as DeviceContext };

@@ -37,6 +37,20 @@ def test_inputs_are_inverted_and_forced(rig: Rig) -> None:
     assert client.read("60FD") == 1 << 16 | 0b001
 
 
+def test_analogue_inputs_are_read_in_digits_and_with_offset_and_divisor(rig: Rig) -> None:
+    client = rig.client
+    rig.device.drive.conditions.analogue = (1023, -500)
+    assert [client.read(f"3220:0{sub}") for sub in (1, 2)] == [1023, -500]
+    assert [client.read(f"3320:0{sub}") for sub in (1, 2)] == [1023, -500], "as delivered: nothing added, divided by 1"
+    client.write("3321:01", -23)
+    client.write("3322:01", 100)
+    client.write("3322:02", -7)
+    assert [client.read(f"3320:0{sub}") for sub in (1, 2)] == [10, 71]
+    client.write("3321:01", -2000)
+    assert client.read("3320:01") == -9, "towards 0"
+    assert client.read("3220:01") == 1023, "the digits stay what they are"
+
+
 def test_routing_begins_as_the_inputs_were_and_then_follows_its_sources(rig: Rig) -> None:
     client = rig.client
     client.write("3240:01", 0b001)
