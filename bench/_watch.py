@@ -65,9 +65,11 @@ class Watch:
 
     async def enable(self) -> None:
         """Give an axis that has come to rest power, as another tool would: nothing moves, but it could."""
-        async with asyncio.timeout(REST_S):
-            while await self._state() not in _AT_REST:  # noqa: ASYNC110
-                await asyncio.sleep(LOOK_S)
+        end_s = time.monotonic() + REST_S
+        while (state := await self._state()) not in _AT_REST:
+            if time.monotonic() > end_s:
+                raise RuntimeError(f"node {AXES[0]} does not come to rest: {state}")
+            await asyncio.sleep(LOOK_S)
         for address, data in _ENABLE:
             await self._driver.write(AXES[0], address, data, verify=Verify.ACK)
 

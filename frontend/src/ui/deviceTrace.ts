@@ -62,8 +62,8 @@ export function sampleOf(store: LiveStore, context: DeviceContext): { timeS: num
   if (!at?.known || at.t_ns === null) return null;
   const number = (entry: EntryDoc | undefined, pace: Pace) => numberAt(store, context, entry, pace);
   const follows =
-    axisStateKey(number(entriesOf(context.doc).get(STATUSWORD), "fast") ?? Number.NaN) ===
-      FOLLOWING && POSITION_MODES.includes(number(entriesOf(context.doc).get(MODE), "slow"));
+    axisStateKey(number(entriesOf(context.doc).get(STATUSWORD), "fast") ?? Number.NaN) === FOLLOWING &&
+    POSITION_MODES.includes(number(entriesOf(context.doc).get(MODE), "slow"));
   return {
     timeS: at.t_ns / 1e9,
     sample: {
