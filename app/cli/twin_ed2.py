@@ -1,0 +1,98 @@
+"""``hubside twin ed2``: digital twins of Wandfluh ED2 controllers, served on PROFIBUS-DP, as a process of their own."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Final
+
+from app.cli.output import Output
+from app.cli.runtime import spare_collector, stop_event
+from app.errors import BusOpenError, UsageError
+from app.model.description_file import load_builtin
+from app.twins.ed2.delivered import ANALOG, INCREMENTAL, SSI_BINARY, SSI_GRAY
+from app.twins.ed2.device import ADDRESS, Ed2, Settings
+from app.twins.ed2.pty_line import PtyLine
+from app.twins.ed2.segment import BAUD_RATES, Segment
+from app.twins.paced_thread import PacedThread
+from app.wire.profibus.fdl import MAX_ADDRESS
+from app.wire.profibus.pzd import First, Order
+
+DESCRIPTION: Final = "wandfluh-ed2"
+TRANSDUCERS: Final = {
+    "incremental": INCREMENTAL,
+    "ssi-binary": SSI_BINARY,
+    "ssi-gray": SSI_GRAY,
+    "analog": ANALOG,
+}
+ORDERS: Final = {f"{byte.value}-{word.value}": Order(byte, word) for byte in First for word in First}
+"""Order of bytes in a word and of words in a double word of the process data: which end comes first."""
+BAUD: Final = 500_000
+
+
+def add_parser(kinds: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Register the command."""
+    parser = kinds.add_parser("ed2", help="controllers of hydraulic axes on PROFIBUS-DP, on a pseudo terminal")
+    parser.add_argument("--baud", type=int, choices=BAUD_RATES, default=BAUD, help="bits a second of the line")
+    parser.add_argument(
+        "--address", type=int, action="append", metavar="N", help=f"address on the bus, may be repeated; {ADDRESS}"
+    )
+    parser.add_argument("--transducer", choices=sorted(TRANSDUCERS), default="ssi-gray", help="position sensors")
+    parser.add_argument(
+        "--pzd-order", choices=sorted(ORDERS), default="high-high", help="which byte and which word come first"
+    )
+    parser.add_argument("--state", type=Path, metavar="DIR", help="where saved parameters are kept")
+    parser.add_argument("--while-stdin", action="store_true", help="end when standard input ends, as the caller has")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace, output: Output) -> int:
+    """Serve until interrupted. Raises UsageError, and BusOpenError where there is no pseudo terminal."""
+    addresses = _addresses(arguments.address)
+    spare_collector()
+    stop = stop_event(while_stdin=arguments.while_stdin)
+    description = load_builtin(DESCRIPTION)
+    devices = [Ed2(description, _settings(arguments, address)) for address in addresses]
+    for device in devices:
+        for problem in device.problems:
+            output.say("cli.twin_problem", reason=problem)
+    segment = Segment([device.slave for device in devices], arguments.baud)
+    try:
+        line = PtyLine(segment, devices)
+    except OSError as error:
+        raise BusOpenError(bus="pty", reason=error.strerror or str(error)) from error
+    thread = PacedThread(line, name="ed2")
+    line.serve(thread)
+    with thread:
+        _announce(line.path, addresses, arguments, output)
+        stop.wait()
+    line.close()
+    return 0
+
+
+def _addresses(given: list[int] | None) -> list[int]:
+    addresses = given or [ADDRESS]
+    for address in addresses:
+        if not 0 <= address <= MAX_ADDRESS:
+            raise UsageError(reason=f"{address}: addresses are 0 to {MAX_ADDRESS}")
+    if len(set(addresses)) < len(addresses):
+        raise UsageError(reason="an address is given twice")
+    return addresses
+
+
+def _settings(arguments: argparse.Namespace, address: int) -> Settings:
+    return Settings(
+        address=address,
+        transducer=TRANSDUCERS[arguments.transducer],
+        order=ORDERS[arguments.pzd_order],
+        state=arguments.state,
+    )
+
+
+def _announce(path: str, addresses: list[int], arguments: argparse.Namespace, output: Output) -> None:
+    if output.as_json:
+        told = {"address": f"{path}@{arguments.baud}", "path": path, "baud": arguments.baud, "slaves": addresses}
+        output.result(told, "")
+    else:
+        output.say("cli.twin_ed2.ready", path=path, baud=arguments.baud, slaves=", ".join(map(str, addresses)))
+        output.say("cli.stop_hint")

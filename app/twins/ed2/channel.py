@@ -1,0 +1,91 @@
+"""One axis as the bus sees it: its parameters and their memory, its PKW jobs, its process data."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Final
+
+from app.model.address import Address
+from app.model.datatypes import Raw
+from app.model.description import Description
+from app.twins.ed2.delivered import delivered, pkw
+from app.twins.ed2.pkw_server import PkwServer, ReadMore
+from app.twins.nonvolatile import NonVolatile
+from app.twins.object_store import ObjectStore, RefusedAccessError
+from app.twins.state_file import StateFile
+from app.wire.profibus import pkw as pkw_codec
+from app.wire.profibus.pzd import Order, decode_pzd, encode_pzd
+from app.wire.profibus.telegrams import Signal, TelegramType
+
+SAVE_NS: Final = 300_000_000
+"""What a save takes (assumed)."""
+
+
+class Channel:
+    """One axis. ``special`` are parameters that are more than a value; ``live`` tells signals of process data."""
+
+    def __init__(
+        self,
+        description: Description,
+        axis: int,
+        transducer: int,
+        state: Path | None,
+        special: dict[Address, ReadMore],
+        live: Callable[[Signal], int],
+    ) -> None:
+        self.store = ObjectStore(description, node_id=0)
+        file = None if state is None else StateFile(state, f"{description.id}/axis-{axis}")
+        self.memory = NonVolatile(
+            self.store,
+            file,
+            duration_ns=SAVE_NS,
+            delivered=delivered(description, transducer, axis),
+            commanded=False,
+        )
+        self.pkw = PkwServer(self.store, special)
+        self.telegram: TelegramType | None = None
+        self.received: dict[Signal, int] = {}
+        """Process data from the master that are in force."""
+        self._live = live
+        self.recall()
+
+    def recall(self) -> None:
+        """Power-on: RAM is what was saved, else the defaults."""
+        self.memory.recall(lambda _entry: True)
+        self.pkw.reset()
+
+    # -- process data ------------------------------------------------------------------------
+
+    def outputs(self, t_ns: int, data: bytes, order: Order) -> dict[Signal, int]:
+        """Take the telegram from the master; gives its process data."""
+        telegram = self.telegram
+        assert telegram is not None  # a configuration came before
+        head = pkw_codec.SIZE if telegram.has_pkw else 0
+        if head:
+            self.pkw.ask(t_ns, data[:head])
+        return decode_pzd(telegram.received, data[head:], order)
+
+    def inputs(self, order: Order) -> bytes:
+        """The telegram to the master."""
+        telegram = self.telegram
+        assert telegram is not None  # a configuration came before
+        values = {signal: self._live(signal) for shared in telegram.sent for signal in shared}
+        return (self.pkw.answer if telegram.has_pkw else b"") + encode_pzd(telegram.sent, values, order)
+
+    # -- parameters --------------------------------------------------------------------------
+
+    def number(self, ind: int, pnu: int) -> int:
+        """A parameter's value."""
+        return self.store.number(ind, pnu)
+
+    def offer(self, ind: int, pnu: int, raw: Raw) -> bool:
+        """Write a parameter by process data; False where it is refused, and then the old value stays."""
+        cell = self.store.at(pkw(ind, pnu))
+        if cell.raw == raw:
+            return True
+        try:
+            self.store.assign(cell, raw)
+        except RefusedAccessError:
+            return False
+        return True
