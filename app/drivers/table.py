@@ -5,18 +5,21 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any, Final
 
-from app.errors import UsageError
+from app.errors import ExtraMissingError, UsageError
 from app.model.description import Bus
 
 DRIVERS: Final[dict[Bus, tuple[str, str]]] = {
     Bus.CANOPEN: ("app.drivers.canopen", "CanOpenDriver"),
     Bus.MODBUS_TCP: ("app.drivers.modbus", "ModbusDriver"),
+    Bus.PROFIBUS_DP: ("app.drivers.profibus_driver", "ProfibusDriver"),
 }
 """Module and class of each driver."""
+EXTRAS: Final = {"pyprofibus": "profibus"}
+"""The optional extra of ours that brings a package."""
 
 
 def driver_class(bus: Bus) -> type[Any]:
-    """The driver of ``bus``. Raises UsageError where there is none, or where its library is not installed."""
+    """The driver of ``bus``. Raises UsageError where there is none, ExtraMissingError where its library is missing."""
     try:
         module, name = DRIVERS[bus]
     except KeyError:
@@ -24,5 +27,7 @@ def driver_class(bus: Bus) -> type[Any]:
     try:
         found: type[Any] = getattr(import_module(module), name)
     except ModuleNotFoundError as error:
+        if error.name in EXTRAS:
+            raise ExtraMissingError(package=error.name, extra=EXTRAS[error.name]) from error
         raise UsageError(reason=f"{bus.value} needs the package {error.name}") from error
     return found

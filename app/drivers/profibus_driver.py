@@ -1,0 +1,357 @@
+"""The driver for PROFIBUS-DP as the Wandfluh ED2 speaks it: DP-V0, parameters by PKW, process data of its telegrams.
+
+It is the only master of its line. Stations of the configuration are run from the start, others from when they are asked
+for something first. A device has no restart command: it is restarted by switching it off and on.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import threading
+import time
+from collections.abc import Callable, Iterable, Sequence
+from typing import Final
+
+from app.drivers.contract import (
+    TWIN_NAME,
+    DriverStatus,
+    FoundNode,
+    FramesCallback,
+    Identity,
+    LinkState,
+    ProgressCallback,
+    Written,
+)
+from app.drivers.profibus_bus import LISTEN_S, ProfibusBus
+from app.drivers.profibus_config import ProfibusConfig, checked, require_node
+from app.drivers.profibus_device import CONTROLWORD, STATUSWORD, ProfibusDevice
+from app.drivers.profibus_image import ENABLING
+from app.drivers.profibus_line import Line, SerialLine
+from app.drivers.profibus_order import OrderCheck
+from app.drivers.profibus_probe import Probed, probe
+from app.drivers.profibus_station import StationState
+from app.drivers.urgent import UrgentCommands
+from app.errors import (
+    BusLostError,
+    BusOpenError,
+    DeviceError,
+    HubsideError,
+    NoAnswerError,
+    PreconditionError,
+)
+from app.model.address import Address
+from app.model.description import Bus, Description, Verify
+from app.model.saving import command_of
+from app.wire.frame import Direction, Fdl, Frame, Stamper
+from app.wire.profibus.control import Station as StationKind
+from app.wire.profibus.fdl import MAX_ADDRESS
+
+_LOG: Final = logging.getLogger(__name__)
+SAVE_TIMEOUT_S: Final = 10.0
+"""The least time-out of a save: non-volatile memory is slow, and the manual names no time."""
+TWIN_IDENT: Final = 0x0ED2
+"""The ident number of our twins: an example that nobody has given out. That of the ED2 is not printed."""
+_PROGRESS_S: Final = 0.05
+_NS: Final = 1_000_000_000
+Open = Callable[[ProfibusConfig], Line]
+
+
+def open_serial(config: ProfibusConfig) -> Line:
+    """The port of ``config``. Raises LineError."""
+    return SerialLine(config.port, config.baud)
+
+
+class ProfibusDriver:
+    """The stations of ``config`` as the bus ``bus``. ``stamper`` gives frames their times."""
+
+    ends_when_silent: Final = True
+
+    def __init__(
+        self, config: ProfibusConfig, stamper: Stamper, bus: str = "profibus0",
+        descriptions: Sequence[Description] = (), open_line: Open = open_serial, listen_s: float = LISTEN_S,
+    ) -> None:  # fmt: skip
+        self.bus = bus
+        self._config = checked(config)
+        self._stamper = stamper
+        self._descriptions = tuple(each for each in descriptions if each.bus is Bus.PROFIBUS_DP)
+        self._commands = UrgentCommands()
+        self._subscribers: list[FramesCallback] = []
+        self._tapping = threading.RLock()
+        self._devices: dict[int, ProfibusDevice] = {}
+        self._open_line = open_line
+        self._listen_s = listen_s
+        self._changed = asyncio.Event()
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._line = self._new_bus()
+        self._open = False
+
+    def _new_bus(self) -> ProfibusBus:
+        config, open_line = self._config, self._open_line
+        return ProfibusBus(
+            config, self.bus, self._stamper, lambda: open_line(config), self._tap, self._tell_change, self._listen_s
+        )
+
+    # -- the link -------------------------------------------------------------------------
+
+    async def connect(self, timeout_s: float = 5.0) -> None:
+        """Open the port and listen, then begin with the stations; returns once each was asked.
+
+        Raises BusOpenError, also where nothing of all that has happened in time, and ForeignMasterError where anybody
+        else speaks on the line: nothing was sent then.
+        """
+        if self._open:
+            return
+        self._loop = asyncio.get_running_loop()
+        self._line, self._open = self._new_bus(), True
+        self._devices = {}
+        self._line.start()
+        try:
+            async with asyncio.timeout(timeout_s):
+                await self._until(lambda: self._line.error is not None or self._begun)
+        except TimeoutError:
+            await self.close()
+            raise BusOpenError(bus=self.bus, reason=f"{self._config.port}: not open within {timeout_s:g} s") from None
+        except asyncio.CancelledError:
+            await self.close()
+            raise
+        error = self._line.error
+        if error is not None:
+            await self.close()
+            raise error
+
+    @property
+    def _begun(self) -> bool:
+        if not self._config.stations:
+            return self._line.state is LinkState.LISTENING and self._line.port is not None
+        first = [self._line.stations[each.node] for each in self._config.stations]
+        waits = [each for each in first if each.looked_s is None or each.state is StationState.STARTING]
+        return self._line.state in (LinkState.CONNECTED, LinkState.LOST) and not waits
+
+    async def close(self, timeout_s: float = 5.0) -> None:
+        """Bring axes to rest, give the slaves back and close the port; what runs ends with BusLostError."""
+        if self._open:
+            self._open = False
+            await asyncio.to_thread(self._line.stop, timeout_s)
+
+    @property
+    def status(self) -> DriverStatus:
+        """Connected is a line on which a station has answered a short while ago; there is never another master."""
+        line = self._line
+        return DriverStatus(self.bus, line.state, line.since_ns, line.reason, 0, line.reconnects, ())
+
+    def subscribe(self, callback: FramesCallback) -> Callable[[], None]:
+        """See Driver."""
+        with self._tapping:
+            self._subscribers = [*self._subscribers, callback]
+
+        def unsubscribe() -> None:
+            with self._tapping:  # once this returns, the callback is not called any more
+                self._subscribers = [each for each in self._subscribers if each is not callback]
+
+        return unsubscribe
+
+    def _tap(self, direction: Direction, data: bytes, age_s: float) -> None:
+        (t_ns,) = self._stamper.take_aged((int(age_s * _NS),))
+        frame = Frame(t_ns, self.bus, direction, Fdl(data))
+        with self._tapping:
+            for subscriber in self._subscribers:
+                try:
+                    subscriber([frame])
+                except Exception:  # noqa: BLE001 - whatever a subscriber does, the others and the wire go on
+                    _LOG.exception("a subscriber of %s failed", self.bus)
+
+    def _tell_change(self) -> None:
+        """On the thread of the bus."""
+        if self._loop is not None:
+            with contextlib.suppress(RuntimeError):  # the loop has ended
+                self._loop.call_soon_threadsafe(self._changed.set)
+
+    async def _until(self, holds: Callable[[], bool]) -> None:
+        while not holds():
+            self._changed.clear()
+            if not holds():
+                await self._changed.wait()
+
+    def set_description(self, node: int, description: Description) -> None:
+        """Take time-outs, names and the save command of ``node`` from its description."""
+        self._device(node).description = description
+
+    # -- parameters ----------------------------------------------------------------------------
+
+    async def read(self, node: int, address: Address, timeout_s: float | None = None, urgent: bool = False) -> bytes:
+        """See Driver. By PKW. Raises PkwRefusedError, NoAnswerError, BusLostError."""
+        return await self._opened(node).read(address, timeout_s, urgent)
+
+    async def read_many(
+        self,
+        node: int,
+        addresses: Iterable[Address],
+        timeout_s: float | None = None,
+        on_progress: ProgressCallback | None = None,
+        urgent: bool = False,
+    ) -> dict[Address, bytes | HubsideError]:
+        """See Driver. A station that does not answer ends the list: the rest is that error."""
+        device, wanted = self._device(node), tuple(dict.fromkeys(addresses))
+        results: dict[Address, bytes | HubsideError] = {}
+        told_s = time.monotonic()
+        for address in wanted:
+            try:
+                self._opened(node)
+                results[address] = await device.read(address, timeout_s, urgent)
+            except DeviceError as error:
+                results[address] = error
+            except NoAnswerError as error:
+                results.update((other, error) for other in wanted if other not in results)
+                break
+            if on_progress is not None and time.monotonic() - told_s >= _PROGRESS_S:
+                told_s = time.monotonic()
+                on_progress(len(results), len(wanted))
+        if on_progress is not None:
+            on_progress(len(results), len(wanted))
+        return results
+
+    async def write(
+        self,
+        node: int,
+        address: Address,
+        data: bytes,
+        timeout_s: float | None = None,
+        verify: Verify = Verify.EQUAL,
+        urgent: bool = False,
+        known: int | None = None,
+    ) -> Written:
+        """See Driver. What process data carry is written there; no bit of the controlword before their order is proven.
+
+        Raises PreconditionError where it cannot be proven.
+        """
+        device = self._opened(node)
+        if urgent:
+            known = self._commands.note(node, address)
+        return await device.write(address, data, timeout_s, verify, urgent, known)
+
+    def commanded(self, node: int, address: Address) -> int:
+        """See Driver."""
+        return self._commands.count(node, address)
+
+    async def check_order(self, node: int) -> OrderCheck:
+        """The guided check of the order of process data: what PKW reads, compared with them."""
+        return await self._opened(node).check_order()
+
+    # -- the whole device -----------------------------------------------------------------------
+
+    async def save(self, node: int, category: str | None = None) -> None:
+        """Save all parameters by db_StoreParameter, with the axis not enabled. Not proven before a restart.
+
+        Raises PreconditionError (the axis is enabled: nothing was saved), UsageError, and what writes raise.
+        """
+        device = self._opened(node)
+        command = command_of(() if device.description is None else device.description.save, category)
+        station = device.station
+        if station is not None and station.image.controlword & ENABLING:
+            raise PreconditionError(
+                address=CONTROLWORD.short,
+                name=device.name(CONTROLWORD),
+                needs="an output stage that is off",
+                needs_key="saving.needs.stage_off",
+                found=f"{station.image.controlword:04X}h",
+            )
+        signature = command.signature.to_bytes(4, "little")
+        timeout_s = max(command.timeout_s, SAVE_TIMEOUT_S)
+        await device.write(command.address, signature, timeout_s, verify=Verify.ACK)
+
+    async def bears(self, node: int, stamp: tuple[int, int]) -> bool:
+        """A save leaves no mark in this device."""
+        return False
+
+    async def restart(self, node: int, timeout_s: float = 10.0) -> None:
+        """Wait until somebody has switched the device off and on: it must fall silent, then exchange data again.
+
+        Raises NoAnswerError where it is not there, or not back in time.
+        """
+        device = self._opened(node)
+        await device.read(STATUSWORD, timeout_s)
+        station = device.station
+        assert station is not None  # it has answered
+        starts = station.starts
+        try:
+            async with asyncio.timeout(timeout_s):
+                await self._until(lambda: station.starts > starts)
+        except TimeoutError:
+            raise NoAnswerError(node=node, address="restart", timeout_s=timeout_s) from None
+
+    async def scan(
+        self, nodes: Sequence[int] | None = None, on_progress: ProgressCallback | None = None
+    ) -> list[FoundNode]:
+        """Ask ``nodes``, or all addresses, who is there. Whom we know no description of is found as well."""
+        master = self._config.master
+        wanted = [node for node in range(MAX_ADDRESS + 1) if node != master] if nodes is None else list(nodes)
+        found = []
+        for number, node in enumerate(wanted, 1):
+            require_node(node, master)
+            probed = await self._probe(node)
+            if probed is not None and probed.kind is StationKind.SLAVE:
+                found.append(self._found(node, probed))
+            if on_progress is not None:
+                on_progress(number, len(wanted))
+        return found
+
+    async def _probe(self, node: int) -> Probed | None:
+        """A station that exchanges data is not asked: it was, and a diagnosis of before is one of now."""
+        self._opened(node)
+        loop = asyncio.get_running_loop()
+        done: asyncio.Future[Probed | None] = loop.create_future()
+
+        def look(bus: ProfibusBus) -> None:
+            station = bus.stations.get(node)
+            known = None if station is None or station.state is StationState.ABSENT else station.probed
+            result: Probed | None = None
+            error: HubsideError | None = BusLostError(bus=self.bus, reason=bus.reason or LinkState.CLOSED.value)
+            try:
+                if bus.port is not None:
+                    result = known or probe(bus.port, node)
+                    error = None
+            finally:  # where the line is lost meanwhile, the bus is told so by what is raised
+                with contextlib.suppress(RuntimeError):  # the loop has ended
+                    loop.call_soon_threadsafe(_settle, done, result, error)
+
+        self._line.post(look)
+        return await done
+
+    def _found(self, node: int, probed: Probed) -> FoundNode:
+        """The manual prints no ident number: who is named in the configuration is the device, and so is our twin."""
+        ident = None if probed.diagnosis is None else probed.diagnosis.ident
+        named = ident == TWIN_IDENT or any(each.node == node for each in self._config.stations)
+        matching = self._descriptions[0] if len(self._descriptions) == 1 and named else None
+        if matching is not None:
+            self._device(node).description = matching
+        name = f"{TWIN_NAME} ED2" if ident == TWIN_IDENT else None
+        description_id = None if matching is None else matching.id
+        return FoundNode(node, None, name, None, None, Identity(product=ident), description_id)
+
+    def _opened(self, node: int) -> ProfibusDevice:
+        """Raises UsageError, BusLostError, and what keeps the station from being run."""
+        device = self._device(node)
+        if not self._open:
+            raise BusLostError(bus=self.bus, node=node, reason=self._line.reason or LinkState.CLOSED.value)
+        device.require_open()
+        return device
+
+    def _device(self, node: int) -> ProfibusDevice:
+        device = self._devices.get(node)
+        if device is None:
+            require_node(node, self._config.master)
+            device = self._devices[node] = ProfibusDevice(self._line, node, self._commands)
+            if len(self._descriptions) == 1:
+                device.description = self._descriptions[0]
+        return device
+
+
+def _settle(done: asyncio.Future[Probed | None], result: Probed | None, error: HubsideError | None) -> None:
+    if done.done():
+        return
+    if error is None:
+        done.set_result(result)
+    else:
+        done.set_exception(error)
