@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from pyprofibus.dp import DpCfgDataElement, DpError
-from pyprofibus.dp_master import DPM1, DpSlaveDesc
+from pyprofibus.dp_master import DPM1, DpSlaveDesc, DpSlaveState
 from pyprofibus.gsd.interp import GsdInterp
 from pyprofibus.gsd.parser import GsdError
 from pyprofibus.phy import CpPhy
@@ -34,6 +34,9 @@ STATUS_SIZE: Final = 6
 DIAGNOSIS_SIZE: Final = 64
 WATCHDOG_MS: Final = 1000
 """So long after our last telegram a slave falls back by itself; less is too near to one lost and repeated request."""
+# The library would parametrise a slave anew after half that time, and so take its outputs from it without need.
+DpSlaveState.stateTimeLimits[DpSlaveState.STATE_DX] = WATCHDOG_MS / 1000
+_MOST_RUNS: Final = 5
 _HEAD: Final = 9
 """Bytes that SD2 adds to its data."""
 
@@ -109,6 +112,11 @@ class _Phy(CpPhy):  # type: ignore[misc]  # the library has no types
             self.answered += 1
             self._replies.append(bytearray(reply.data))
 
+    @property
+    def has_reply(self) -> bool:
+        """The library has not taken it yet."""
+        return bool(self._replies)
+
     def poll(self, timeout: float = 0.0) -> bytearray | None:
         return self._replies.popleft() if self._replies else None
 
@@ -162,9 +170,7 @@ class DpSlave:
         if exchanging:
             self._slave.setMasterOutData(bytearray(outputs))
         try:
-            self._master.run()
-            self._master.run()
-            inputs = self._slave.getMasterInData()  # the next run would lose them
+            inputs = self._run()
         except DpError as error:
             _LOG.info("slave %d: %s", self.node, error)
             return Exchange(Step.NOT_ACTIVE)
@@ -177,6 +183,22 @@ class DpSlave:
             return Exchange(Step.STARTING)
         fresh, self._uncertain = not self._uncertain, False
         return Exchange(Step.EXCHANGED, bytes(inputs), fresh)
+
+
+    def _run(self) -> bytearray | None:
+        """Have the library ask once and take the answer, each of which is a run of its own.
+
+        A run may also only note that a time is over, so runs are not counted in pairs: an answer that is left for the
+        next turn would leave all later ones late by one.
+        """
+        inputs, asked = None, self._phy.asked
+        for number in range(_MOST_RUNS):
+            self._master.run()
+            inputs = self._slave.getMasterInData() or inputs  # the next run would lose them
+            idle = self._phy.asked == asked and number > 0
+            if idle or (self._phy.asked > asked and not self._phy.has_reply):
+                break
+        return inputs
 
 
 def _description(node: int, plan: Plan) -> Any:

@@ -44,7 +44,7 @@ from app.wire.profibus.telegrams import (
     Signal,
 )
 
-DEFAULT_TIMEOUT_S: Final = 1.0
+DEFAULT_TIMEOUT_S: Final = 2.0
 CONTROLWORD: Final = Address(0, 37, Addressing.PKW)
 STATUSWORD: Final = Address(0, 38, Addressing.PKW)
 _LENGTHS: Final = (1, 2, 4)

@@ -271,8 +271,10 @@ class ProfibusDriver:
         Raises NoAnswerError where it is not there, or not back in time.
         """
         device = self._opened(node)
-        await device.read(STATUSWORD, timeout_s)
         station = device.station
+        if station is None or station.state is not StationState.EXCHANGING:
+            await device.read(STATUSWORD, timeout_s)
+            station = device.station
         assert station is not None  # it has answered
         starts = station.starts
         try:

@@ -64,6 +64,8 @@ class PkwJob:
 
 
 _IDLE: Final = pkw.IDLE.encode()
+STILL_S: Final = 0.3
+"""More than one turn of the line takes: what goes beyond it the host was not there."""
 
 
 class PkwChannel:
@@ -76,6 +78,7 @@ class PkwChannel:
         """The bytes of the job, where it stands in the telegrams."""
         self._clear = False
         """The station has shown AK 0 since the last job."""
+        self._looked_s: float | None = None
         self.malformed = 0
         """Answers that were none."""
 
@@ -135,7 +138,14 @@ class PkwChannel:
             self._finish(answer)
 
     def expire(self, now_s: float) -> None:
-        """Begin the next job where none is under way, and end the one whose time is over."""
+        """Begin the next job where none is under way, and end the one whose time is over.
+
+        Where the host stood still, nobody's time has run: a device cannot have answered what was not asked.
+        """
+        still_s = 0.0 if self._looked_s is None else max(0.0, now_s - self._looked_s - STILL_S)
+        self._looked_s = now_s
+        if self._job is not None and self._job.deadline_s is not None:
+            self._job.deadline_s += still_s
         if self._job is not None and self._job.deadline_s is not None and now_s >= self._job.deadline_s:
             self._finish(Failure.TIMEOUT)
         if self._job is None and self._queue:

@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterable
 from typing import Final, NamedTuple
 
 from app.drivers.profibus_config import wire_s
-from app.drivers.profibus_line import Line
+from app.drivers.profibus_line import NOTHING, Line
 from app.errors import ForeignMasterError
 from app.wire.frame import Direction
 from app.wire.profibus import dp
@@ -144,9 +144,12 @@ class ProfibusPort:
         request = _Sent(data, sent_s + on_wire_s, self)
         end_s = sent_s + self.slot_s(len(data), reply_size)
         reply, spoilt = None, False
-        while reply is None and (left_s := end_s - self.line.now_s()) > 0:
-            received = self.line.receive(left_s)
+        while reply is None:
+            left_s = end_s - self.line.now_s()
+            received = self.line.receive(max(0.0, left_s))
             arrived_s = self.line.now_s()
+            if left_s <= 0 and received == NOTHING:
+                break  # not before a last look: where the host stood still the answer is there
             self.counters.damaged += received.broken
             spoilt = spoilt or received.broken > 0
             for piece in self._splitter.feed(received.data):

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-from app.drivers.profibus_port import ProfibusPort, ShortAck, Telegram
+from app.drivers.profibus_port import ProfibusPort
 from app.wire.profibus import dp
 from app.wire.profibus.configuration import Module
 from app.wire.profibus.control import Reply, Station
 from app.wire.profibus.diagnosis import Diagnosis
+from app.wire.profibus.fdl import BROADCAST, ShortAck, Telegram
 from app.wire.profibus.fields import FormatError
 
 _REPEATS: Final = 1
@@ -50,7 +51,7 @@ def leave(port: ProfibusPort, node: int, ident: int) -> None:
 
 def clear(port: ProfibusPort) -> None:
     """Tell all slaves that outputs are not in force any more."""
-    port.tell(dp.encode_request(dp.GlobalControl(dp.Command.CLEAR), port.master, 127))
+    port.tell(dp.encode_request(dp.GlobalControl(dp.Command.CLEAR), port.master, BROADCAST))
 
 
 def _ask(port: ProfibusPort, node: int, service: dp.Service, size: int) -> dp.ServiceAnswer | None:

@@ -204,7 +204,9 @@ class Station:
         if came.step is Step.UNANSWERED:
             self._unanswered += 1
         gone = came.step is Step.NOT_ACTIVE or self._unanswered >= GONE_AFTER
-        if gone or (not slave.exchanging and now_s - self._started_s > START_S):
+        if not slave.exchanging:  # it never was, or the library has given it up
+            gone = gone or self.state is StationState.EXCHANGING or now_s - self._started_s > START_S
+        if gone:
             self._drop()
             return 0.0
         return RETRY_S if came.step is Step.WAITING else 0.0

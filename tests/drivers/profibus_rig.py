@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import threading
 import time
 from collections.abc import AsyncIterator, Callable, Iterator
@@ -9,6 +10,7 @@ from contextlib import asynccontextmanager, contextmanager
 
 from app.drivers.profibus_config import ProfibusConfig, ProfibusStation
 from app.drivers.profibus_driver import ProfibusDriver
+from app.drivers.profibus_station import StationState
 from app.model.address import Address, Addressing
 from app.model.description_file import load_builtin
 from app.twins.ed2.device import Ed2, Settings
@@ -91,3 +93,10 @@ async def connected(config: ProfibusConfig, listen_s: float = LISTEN_S) -> Async
         yield driver
     finally:
         await driver.close()
+
+
+async def gone(driver: ProfibusDriver, node: int) -> None:
+    """Wait until the driver has noticed that nobody answers at ``node``."""
+    station = driver._line.stations[node]
+    async with asyncio.timeout(DEADLINE_S):
+        await driver._until(lambda: station.state is StationState.ABSENT)

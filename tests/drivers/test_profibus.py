@@ -7,7 +7,7 @@ from collections.abc import AsyncIterator
 import pytest
 
 from tests.drivers.contract_suite import Bench, DriverContract
-from tests.drivers.profibus_rig import ABSENT, ED2, NODE, RAMP_VELOCITY, STATUSWORD, connected, ip, wire
+from tests.drivers.profibus_rig import ABSENT, ED2, NODE, RAMP_VELOCITY, STATUSWORD, connected, gone, ip, wire
 
 
 class TestContract(DriverContract):
@@ -15,11 +15,15 @@ class TestContract(DriverContract):
     async def bench(self) -> AsyncIterator[Bench]:
         with wire() as line:
 
-            async def power_cycle() -> None:
-                line.power_off()
-                line.power_on()
-
             async with connected(line.config(NODE)) as driver:
+
+                async def switch() -> None:
+                    starts = driver._line.stations[NODE].starts
+                    line.power_off()
+                    await gone(driver, NODE)
+                    line.power_on()
+                    assert driver._line.stations[NODE].starts == starts
+
                 yield Bench(
                     driver=driver,
                     node=NODE,
@@ -31,4 +35,5 @@ class TestContract(DriverContract):
                     read_only=STATUSWORD,
                     read_only_data=bytes(2),
                     unknown=ip(0, 250),
+                    switch=switch,
                 )
