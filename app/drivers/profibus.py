@@ -184,7 +184,6 @@ class DpSlave:
         fresh, self._uncertain = not self._uncertain, False
         return Exchange(Step.EXCHANGED, bytes(inputs), fresh)
 
-
     def _run(self) -> bytearray | None:
         """Have the library ask once and take the answer, each of which is a run of its own.
 

@@ -53,7 +53,7 @@ _SOURCES: Final = {SETPOINT: ACTUAL, RAMP_DECELERATION: RAMP_ACCELERATION}
 
 
 class ProfibusDevice:
-    """The station at ``node`` of ``bus``. Lives in the event loop that made it."""
+    """The station at ``node`` of ``bus``. Lives in the event loop in which it is asked."""
 
     def __init__(self, bus: ProfibusBus, node: int, commands: UrgentCommands) -> None:
         self.node = node
@@ -65,7 +65,10 @@ class ProfibusDevice:
         self._bus = bus
         self._commands = commands
         self._preparing = asyncio.Lock()
-        self._loop = asyncio.get_running_loop()
+
+    def renew(self, bus: ProfibusBus) -> None:
+        """The line was closed and is opened again: all that was known of the station is void."""
+        self._bus, self.order_check, self.prepared = bus, None, 0
 
     @property
     def station(self) -> Station | None:
@@ -132,11 +135,11 @@ class ProfibusDevice:
         self, request: PkwRequest, timeout_s: float, urgent: bool, refusal: Callable[[], Failure | None]
     ) -> tuple[Result, bool, bytes]:
         """What became of a job, whether it was sent, and the process data that came with its answer."""
-        done: asyncio.Future[tuple[Result, bool, bytes]] = self._loop.create_future()
+        done: asyncio.Future[tuple[Result, bool, bytes]] = asyncio.get_running_loop().create_future()
 
         def end(result: Result, sent: bool) -> None:
             station = self.station
-            self._tell(done, (result, sent, b"" if station is None else station.inputs))
+            _tell(done, (result, sent, b"" if station is None else station.inputs))
 
         job = PkwJob(request, timeout_s, end, urgent, refusal)
         self._post(lambda station: station.channel.put(job))
@@ -180,9 +183,9 @@ class ProfibusDevice:
         timeout_s: float | None = None, urgent: bool = False, known: int | None = None,
     ) -> None:  # fmt: skip
         """Give signals new values at once, and wait until the station has them."""
-        done: asyncio.Future[tuple[Failure | None, bool]] = self._loop.create_future()
+        done: asyncio.Future[tuple[Failure | None, bool]] = asyncio.get_running_loop().create_future()
         change = Change(
-            values, lambda failure, sent: self._tell(done, (failure, sent)), urgent, self._overtaken(address, known)
+            values, lambda failure, sent: _tell(done, (failure, sent)), urgent, self._overtaken(address, known)
         )
         self._post(lambda station: station.image.put(change))
         wait_s = self._timeout_s(address, timeout_s)
@@ -285,14 +288,6 @@ class ProfibusDevice:
             self.require_open()
         self._bus.post(lambda bus: do(bus.station(self.node)))
 
-    def _tell(self, done: asyncio.Future[Any], result: Any) -> None:
-        def settle() -> None:
-            if not done.done():
-                done.set_result(result)
-
-        with contextlib.suppress(RuntimeError):  # the loop has ended, and with it who waited
-            self._loop.call_soon_threadsafe(settle)
-
     def _overtaken(self, address: Address, known: int | None) -> Callable[[], Failure | None]:
         def refusal() -> Failure | None:
             newer = known is not None and self._commands.count(self.node, address) != known
@@ -335,3 +330,14 @@ def _checked(address: Address) -> Address:
     if address.addressing is not Addressing.PKW or not (0 <= address.major <= 255 and 0 <= address.minor <= 255):
         raise UsageError(reason=f"{address} is no IND/PNU (examples: 0/38, 12/100)")
     return address
+
+
+def _tell(done: asyncio.Future[Any], result: Any) -> None:
+    """From the thread of the bus."""
+
+    def settle() -> None:
+        if not done.done():
+            done.set_result(result)
+
+    with contextlib.suppress(RuntimeError):  # the loop has ended, and with it who waited
+        done.get_loop().call_soon_threadsafe(settle)

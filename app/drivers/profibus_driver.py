@@ -105,7 +105,8 @@ class ProfibusDriver:
             return
         self._loop = asyncio.get_running_loop()
         self._line, self._open = self._new_bus(), True
-        self._devices = {}
+        for device in self._devices.values():
+            device.renew(self._line)
         self._line.start()
         try:
             async with asyncio.timeout(timeout_s):

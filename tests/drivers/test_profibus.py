@@ -14,7 +14,6 @@ class TestContract(DriverContract):
     @pytest.fixture
     async def bench(self) -> AsyncIterator[Bench]:
         with wire() as line:
-
             async with connected(line.config(NODE)) as driver:
 
                 async def switch() -> None:
