@@ -142,6 +142,7 @@ class ProfibusBus:
         while not self._closing:
             try:
                 self.open()
+                self._on_change()
                 attempt = 0
                 while not self._closing:
                     wait_s = self.turn()

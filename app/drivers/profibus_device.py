@@ -135,6 +135,7 @@ class ProfibusDevice:
         self, request: PkwRequest, timeout_s: float, urgent: bool, refusal: Callable[[], Failure | None]
     ) -> tuple[Result, bool, bytes]:
         """What became of a job, whether it was sent, and the process data that came with its answer."""
+        self._require_pkw(request.address)
         done: asyncio.Future[tuple[Result, bool, bytes]] = asyncio.get_running_loop().create_future()
 
         def end(result: Result, sent: bool) -> None:
@@ -272,6 +273,13 @@ class ProfibusDevice:
         if station is None or station.state is not StationState.EXCHANGING:
             raise NoAnswerError(node=self.node, address="Data_Exchange", timeout_s=DEFAULT_TIMEOUT_S)
         return station
+
+    def _require_pkw(self, address: Address) -> None:
+        """Raises RefusedError where the station's telegram carries no parameters (ED2 manual, 4.5)."""
+        station = self.station
+        if station is not None and not station.telegram.has_pkw:
+            reason = f"telegram {station.telegram.number} carries no parameters (1, 102 and 103 do)"
+            raise RefusedError(device=str(self.node), address=address.short, reason=reason)
 
     def require_open(self) -> None:
         """Raises BusLostError, BusOpenError or what keeps the station from being run."""

@@ -27,7 +27,8 @@ def driver_class(bus: Bus) -> type[Any]:
     try:
         found: type[Any] = getattr(import_module(module), name)
     except ModuleNotFoundError as error:
-        if error.name in EXTRAS:
-            raise ExtraMissingError(package=error.name, extra=EXTRAS[error.name]) from error
+        package = str(error.name).partition(".")[0]
+        if package in EXTRAS:
+            raise ExtraMissingError(package=package, extra=EXTRAS[package]) from error
         raise UsageError(reason=f"{bus.value} needs the package {error.name}") from error
     return found
