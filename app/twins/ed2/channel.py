@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Final
 
 from app.model.address import Address
 from app.model.datatypes import Raw
 from app.model.description import Description
-from app.twins.ed2.delivered import delivered, pkw
+from app.twins.ed2.delivered import SIGNALS, delivered, pkw
 from app.twins.ed2.pkw_server import PkwServer, ReadMore
 from app.twins.nonvolatile import NonVolatile
 from app.twins.object_store import ObjectStore, RefusedAccessError
@@ -31,9 +31,10 @@ class Channel:
         axis: int,
         transducer: int,
         state: Path | None,
-        special: dict[Address, ReadMore],
+        special: Mapping[Address, ReadMore],
         live: Callable[[Signal], int],
     ) -> None:
+        self._transducer = transducer
         self.store = ObjectStore(description, node_id=0)
         file = None if state is None else StateFile(state, f"{description.id}/axis-{axis}")
         self.memory = NonVolatile(
@@ -43,7 +44,9 @@ class Channel:
             delivered=delivered(description, transducer, axis),
             commanded=False,
         )
-        self.pkw = PkwServer(self.store, special)
+        self.pkw = PkwServer(self.store, special, self._written)
+        self.changed = True
+        """A parameter was written since somebody looked."""
         self.telegram: TelegramType | None = None
         self.received: dict[Signal, int] = {}
         """Process data from the master that are in force."""
@@ -53,7 +56,13 @@ class Channel:
     def recall(self) -> None:
         """Power-on: RAM is what was saved, else the defaults."""
         self.memory.recall(lambda _entry: True)
+        # OPEN: listed as lost without power (4.4). Then it can only be that of the hardware when power comes back.
+        self.store.at(pkw(1, 97)).raw = SIGNALS[self._transducer]
         self.pkw.reset()
+        self.received, self.changed = {}, True
+
+    def _written(self) -> None:
+        self.changed = True
 
     # -- process data ------------------------------------------------------------------------
 
@@ -88,4 +97,14 @@ class Channel:
             self.store.assign(cell, raw)
         except RefusedAccessError:
             return False
+        self.changed = True
         return True
+
+    def put(self, ind: int, pnu: int, raw: int) -> None:
+        """Give a parameter its value, whatever conditions it has."""
+        self.store.cell(ind, pnu).raw = raw
+        self.changed = True
+
+    def show(self, ind: int, pnu: int, source: Callable[[], int]) -> None:
+        """Let a parameter tell a live value."""
+        self.store.cell(ind, pnu).source = source

@@ -29,7 +29,6 @@ _ALL: Final[dict[Address, Raw]] = {
     pkw(0, 41): 0,  # control by the bus
     pkw(0, 53): 0,  # synchronous
     pkw(1, 84): 1,  # millimetres
-    pkw(1, 97): 2,
     pkw(1, 104): 1,
     pkw(3, 133): 0,
     pkw(12, 42): 5,
@@ -48,10 +47,12 @@ _ALL: Final[dict[Address, Raw]] = {
 }
 _DIGITAL_RESOLUTION: Final = 5_000
 """5 µm a step."""
+_SSI_OFFSET: Final = -5_000
+"""-50.00 mm: the zero of the sensor lies so far before the retracted end."""
 _ANALOG_RESOLUTION: Final = 500_000_000
 """500 mm over the whole range of the signal."""
-_ANALOG_SIGNAL: Final = 3
-"""4 to 20 mA: a broken wire shows."""
+SIGNALS: Final = {INCREMENTAL: 0, SSI_BINARY: 2, SSI_GRAY: 2, ANALOG: 3}
+"""1/97 by the kind of sensor: 25 bits, and 4 to 20 mA, with which a broken wire shows."""
 
 
 def delivered(description: Description, transducer: int, axis: int) -> dict[Address, bytes]:
@@ -61,7 +62,7 @@ def delivered(description: Description, transducer: int, axis: int) -> dict[Addr
         **_ALL,
         pkw(1, 22): transducer,
         pkw(1, 20): axis - 1 if analog else 7 + axis,
-        pkw(1, 97): _ANALOG_SIGNAL if analog else 0 if transducer == INCREMENTAL else 2,
+        pkw(1, 98): 0 if analog or transducer == INCREMENTAL else _SSI_OFFSET,
         pkw(1, 99): _ANALOG_RESOLUTION if analog else _DIGITAL_RESOLUTION,
     }
     return {address: encode_raw(description.entry(address).type, raw) for address, raw in raws.items()}

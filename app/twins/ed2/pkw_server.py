@@ -8,7 +8,7 @@ milliseconds, and nothing.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Final, NamedTuple
 
 from app.model.address import Address, Addressing
@@ -48,11 +48,15 @@ class _Work(NamedTuple):
 
 
 class PkwServer:
-    """The channel of one telegram. ``special`` are parameters whose read says more than an address."""
+    """The channel of one telegram.
 
-    def __init__(self, store: ObjectStore, special: dict[Address, ReadMore]) -> None:
+    ``special`` are parameters whose read says more than an address; ``written`` is told of every write.
+    """
+
+    def __init__(self, store: ObjectStore, special: Mapping[Address, ReadMore], written: Callable[[], None]) -> None:
         self._store = store
         self._special = special
+        self._written = written
         self._work: _Work | None = None
         self.reset()
 
@@ -112,6 +116,7 @@ class PkwServer:
         except RefusedAccessError as error:
             self._answer = _refusal(job.address, _code_of(error))
             return
+        self._written()
         if deferred is None:
             self._answer = _done(job)
         else:

@@ -298,6 +298,13 @@ class Rig:
     line: DpLine
     master: Master
 
+    def restart(self) -> None:
+        """Power off and on, and the self test."""
+        self.device.power_off()
+        self.master.wire.wait(100)
+        self.device.power_on()
+        self.master.wire.wait(1_000)
+
 
 def made(settings: Settings | None = None, *, baud: int = 1_500_000) -> Rig:
     """A twin on the in-process line."""

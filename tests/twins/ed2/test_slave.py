@@ -182,7 +182,7 @@ def test_sync_holds_outputs_and_freeze_holds_inputs() -> None:
 def test_after_power_off_it_waits_for_parameters() -> None:
     rig = made()
     rig.master.start()
-    rig.device.restart()
+    rig.restart()
     assert rig.master.ask(dp.DataExchange(rig.master.outputs())) == REFUSED
     rig.master.start()
 
