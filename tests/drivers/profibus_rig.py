@@ -13,10 +13,11 @@ from app.drivers.profibus_driver import ProfibusDriver
 from app.drivers.profibus_station import StationState
 from app.model.address import Address, Addressing
 from app.model.description_file import load_builtin
-from app.twins.ed2.device import Ed2, Settings
+from app.twins.ed2.device import BOOT_NS, Ed2, Settings
 from app.twins.ed2.pty_line import PtyLine
 from app.twins.ed2.segment import Segment
 from app.twins.paced_thread import PacedThread
+from app.wire.profibus.telegrams import Signal
 from tests.drivers.wire import stamper
 
 ED2 = load_builtin("wandfluh-ed2")
@@ -61,19 +62,22 @@ class Wire:
         assert done.wait(DEADLINE_S), "the line's thread did not come to it"
 
     def power_off(self) -> None:
-        self.do(self.device.slave.power_off)
+        self.do(self.device.power_off)
 
     def power_on(self) -> None:
-        def on() -> None:
-            self.device.restart()
+        self.do(self.device.power_on)
 
-        self.do(on)
+    @property
+    def received(self) -> dict[Signal, int]:
+        """Process data of the first axis as the device understood them."""
+        return self.device.channels[0].received
 
 
 @contextmanager
 def wire(baud: int = BAUD, settings: Settings | None = None) -> Iterator[Wire]:
     device = Ed2(ED2, settings or Settings())
     line = PtyLine(Segment((device.slave,), baud), (device,))
+    line.run_until(BOOT_NS)
     thread = PacedThread(line, time.monotonic_ns)
     line.serve(thread)
     thread.start()

@@ -23,14 +23,16 @@ from app.errors import (
     ForeignMasterError,
     IdentityError,
     NoAnswerError,
+    OvertakenError,
     PkwRefusedError,
     PreconditionError,
     RefusedError,
     UsageError,
 )
 from app.model.address import Address
-from app.model.description import Bus
+from app.model.description import Bus, Verify
 from app.model.texts import error_text, load_texts
+from app.twins.ed2.device import Settings
 from app.twins.ed2.dp_slave import DpState
 from app.wire.frame import Direction, Fdl, Frame
 from app.wire.profibus import dp
@@ -38,16 +40,20 @@ from app.wire.profibus.decoder import ProfibusDecoder
 from app.wire.profibus.dp import Command, DataExchange, GlobalControl, Service, SetPrm
 from app.wire.profibus.fdl import Telegram, Token, decode
 from app.wire.profibus.pkw import PkwError
-from app.wire.profibus.telegrams import TELEGRAM_TYPES, assumed_modules
+from app.wire.profibus.pzd import AS_PKW, AS_PRINTED, First, Order, encode_pzd
+from app.wire.profibus.telegrams import CONTROL_WORD, SETPOINT, TELEGRAM_TYPES, assumed_modules
+from app.wire.profibus.telegrams import RAMP_VELOCITY as RAMP_VELOCITY_SIGNAL
 from app.wire.records import Outcome, SaveSeen, SdoAccess, SdoSeen, SlaveSeen, SlaveState
 from tests.drivers.contract_suite import Bench, DriverContract
 from tests.drivers.profibus_rig import (
     ABSENT,
+    ACTUAL,
     CONTROLWORD,
     DEADLINE_S,
     ED2,
     LOCAL,
     NODE,
+    RAMP_ACCELERATION,
     RAMP_VELOCITY,
     STATUSWORD,
     STORE,
@@ -60,6 +66,7 @@ from tests.drivers.profibus_rig import (
 from tests.drivers.wire import stamper
 
 OTHER = 1
+SETPOINT_VALUE = ip(12, 21)
 FIRST, SECOND = (100).to_bytes(4, "little"), (200).to_bytes(4, "little")
 
 
@@ -124,7 +131,7 @@ import sys
 sys.modules["pyprofibus"] = None
 from app.drivers.table import driver_class
 from app.errors import ExtraMissingError
-from app.model.description import Bus
+from app.model.description import Bus, Verify
 from app.model.texts import error_text, load_texts
 try:
     driver_class(Bus.PROFIBUS_DP)
@@ -206,7 +213,7 @@ async def test_connected_is_only_who_answers() -> None:
             assert (driver.status.state, driver.status.reason) == (LinkState.LOST, "no station answers")
             line.power_on()
             await becomes(driver, LinkState.CONNECTED)
-            assert len(await driver.read(NODE, RAMP_VELOCITY)) == 4
+            assert len(await driver.read(NODE, RAMP_VELOCITY, timeout_s=DEADLINE_S)) == 4
             line.power_off()
             await becomes(driver, LinkState.LOST)
 
@@ -328,19 +335,118 @@ async def test_the_passive_decoder_sees_the_same() -> None:
 # -- process data ----------------------------------------------------------------------------------
 
 
-async def test_no_bit_of_the_controlword_is_sent_while_the_order_is_not_proven() -> None:
-    """The twin stands at 0 and says 0: that proves nothing."""
-    with wire() as line:
+AT_ZERO = Settings(places_mm=(0.0, 0.0))
+"""An actual value of 0 looks the same in either order of words."""
+
+
+@pytest.mark.parametrize("order", [Order(byte, word) for byte in First for word in First])
+@pytest.mark.parametrize("telegram", [1, 102, 103])
+async def test_the_order_of_bytes_is_found_before_a_bit_of_the_controlword_is_sent(order: Order, telegram: int) -> None:
+    with wire(settings=Settings(order=order)) as line:
+        driver = unconnected(line, ProfibusStation(NODE, telegram))
+        said = Line(driver)
+        await driver.connect()
+        try:
+            assert await driver.write(NODE, CONTROLWORD, b"\7\0", verify=Verify.EFFECT) is Written.ACKNOWLEDGED
+            check = await driver.check_order(NODE)
+            assert check.proven == order
+            assert line.received[CONTROL_WORD] == 7
+            place = int.from_bytes(await driver.read(NODE, ACTUAL), "little", signed=True)
+            assert line.received[SETPOINT] == pytest.approx(place, abs=1000)
+        finally:
+            await driver.close()
+        data = [each.outputs[8:] for each in said.asked if isinstance(each, DataExchange)]
+        assert {each[:2] for each in data} == {b"\0\0", encode_pzd(((CONTROL_WORD,),), {CONTROL_WORD: 7}, order)}
+        assert not any(map(any, data[:10]))
+
+
+async def test_no_bit_is_sent_while_the_order_is_not_proven() -> None:
+    with wire(settings=AT_ZERO) as line:
         driver = unconnected(line, NODE)
         said = Line(driver)
         await driver.connect()
         assert await driver.write(NODE, CONTROLWORD, bytes(2)) is Written.ACKNOWLEDGED
-        with pytest.raises(PreconditionError) as caught:
-            await driver.write(NODE, CONTROLWORD, b"\7\0")
-        for language in ("en", "de"):
-            assert "profibus." not in error_text(load_texts(language), caught.value)
+        for address, data in ((CONTROLWORD, b"\7\0"), (SETPOINT_VALUE, FIRST)):
+            with pytest.raises(PreconditionError) as caught:
+                await driver.write(NODE, address, data)
+            for language in ("en", "de"):
+                assert "profibus." not in error_text(load_texts(language), caught.value)
         await driver.close()
         assert all(each.outputs[8:] == bytes(6) for each in said.asked if isinstance(each, DataExchange))
+
+
+@pytest.mark.parametrize(("setting", "goes"), [(AS_PKW, True), (AS_PRINTED, False)])
+async def test_the_site_may_tell_the_order_of_words_but_not_against_what_is_seen(setting: Order, goes: bool) -> None:
+    with wire(settings=AT_ZERO) as line:
+        async with connected(line.config(ProfibusStation(NODE, order=setting))) as driver:
+            if goes:
+                await driver.write(NODE, CONTROLWORD, b"\7\0", verify=Verify.EFFECT)
+                assert line.received[CONTROL_WORD] == 7
+            else:
+                with pytest.raises(PreconditionError):
+                    await driver.write(NODE, CONTROLWORD, b"\7\0", verify=Verify.EFFECT)
+                assert not line.received.get(CONTROL_WORD)
+
+
+async def test_a_station_that_was_gone_begins_with_a_controlword_of_0_and_a_new_proof() -> None:
+    with wire() as line:
+        async with connected(line.config(NODE)) as driver:
+            await driver.write(NODE, CONTROLWORD, b"\7\0", verify=Verify.EFFECT)
+            line.power_off()
+            await gone(driver, NODE)
+            line.power_on()
+            await driver.read(NODE, STATUSWORD, timeout_s=DEADLINE_S)
+            assert not line.received.get(CONTROL_WORD)
+            await driver.write(NODE, CONTROLWORD, b"\3\0", verify=Verify.EFFECT)
+            assert line.received[CONTROL_WORD] == 3
+
+
+async def test_what_a_telegram_carries_is_written_there_and_read_back() -> None:
+    """Process data win over PKW: in telegram 103 that goes for the ramps, in 102 for the modes."""
+    with wire() as line:
+        async with connected(line.config(ProfibusStation(NODE, 103))) as driver:
+            assert await driver.write(NODE, RAMP_VELOCITY, SECOND) is Written.READ_BACK
+            assert line.received[RAMP_VELOCITY_SIGNAL] == 200
+            too_much = (1 << 16).to_bytes(4, "little")
+            with pytest.raises(RefusedError):
+                await driver.write(NODE, RAMP_ACCELERATION, too_much)
+
+
+async def test_a_save_needs_an_axis_that_is_not_enabled() -> None:
+    with wire() as line:
+        async with connected(line.config(NODE)) as driver:
+            await driver.write(NODE, CONTROLWORD, b"\7\0", verify=Verify.EFFECT)
+            with pytest.raises(PreconditionError):
+                await driver.save(NODE)
+            await driver.write(NODE, CONTROLWORD, bytes(2), urgent=True)
+            await driver.save(NODE)
+
+
+async def test_a_stop_goes_at_once_and_no_older_command_after_it() -> None:
+    with wire() as line:
+        async with connected(line.config(NODE)) as driver:
+            await driver.write(NODE, CONTROLWORD, b"\7\0", verify=Verify.EFFECT)
+            known = driver.commanded(NODE, CONTROLWORD)
+            reading = asyncio.gather(*(driver.read(NODE, each.address) for each in ED2 if each.access.readable))
+            await driver.write(NODE, CONTROLWORD, bytes(2), urgent=True)
+            assert line.received[CONTROL_WORD] == 0
+            with pytest.raises(OvertakenError):
+                await driver.write(NODE, CONTROLWORD, b"\7\0", verify=Verify.EFFECT, known=known)
+            assert line.received[CONTROL_WORD] == 0
+            reading.cancel()
+            await asyncio.gather(reading, return_exceptions=True)
+
+
+async def test_closing_takes_the_controlword_back() -> None:
+    with wire() as line:
+        driver = unconnected(line, NODE)
+        said = Line(driver)
+        await driver.connect()
+        await driver.write(NODE, CONTROLWORD, b"\7\0", verify=Verify.EFFECT)
+        await driver.close()
+        assert [type(each) for each in said.asked[-2:]] == [GlobalControl, SetPrm]
+        assert isinstance(said.asked[-3], DataExchange)
+        assert said.asked[-3].outputs[8:] == bytes(6)
 
 
 # -- the device's own file --------------------------------------------------------------------------
