@@ -33,6 +33,10 @@ _SLOW_DELAY_BITS: Final = 60
 _SLOW: Final = 187500
 _EARLY: Final = 0.9
 """Rates may differ by less than 1 %, clocks of the host by more; an answer of before is a whole telegram early."""
+_QUIET_BITS: Final = 44
+"""TSYN, 33 bits, and the character whose end would be seen."""
+_BABBLE_S: Final = 1.0
+"""A line on which something comes for so long without a pause is not ours."""
 _TOKENS: Final = 2
 """A token has no check sum: within ``_TOKENS_S`` so many make a master. Where nothing was sent yet, one does."""
 _TOKENS_S: Final = 1.0
@@ -173,9 +177,16 @@ class ProfibusPort:
     # -- what nobody asked for ----------------------------------------------------------------------
 
     def _drain(self) -> None:
-        """Whatever is there belongs to nothing that is asked from now on, and neither does its end."""
-        while data := self._received(0.0):
+        """Whatever is there belongs to nothing that is asked from now on, and neither does its end.
+
+        Before a request the line is idle for TSYN: an answer that comes twice follows itself sooner than that. Raises
+        ForeignMasterError where it never is.
+        """
+        begun_s = self.line.now_s()
+        while data := self._received(_QUIET_BITS / self.baud):
             self._stray(self._splitter.feed(data))
+            if self.line.now_s() - begun_s > _BABBLE_S:
+                raise ForeignMasterError(bus=self.bus, reason_key="profibus.foreign.noise", master=None)
         self._stray(self._splitter.silence())
 
     def _received(self, timeout_s: float) -> bytes:

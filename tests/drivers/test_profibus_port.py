@@ -250,8 +250,15 @@ def test_what_is_told_to_all_is_not_answered_and_has_left_when_we_go_on() -> Non
     clear = dp.encode_request(dp.GlobalControl(dp.Command.CLEAR), MASTER, 127)
     port.tell(clear)
     assert decode(line.sent[0]) == clear
-    assert line.time_s - 100 == pytest.approx(wire_s(len(line.sent[0]), BAUD))
+    assert line.time_s - 100 == pytest.approx(wire_s(len(line.sent[0]), BAUD) + 44 / BAUD)
     assert seen.short == "TX:68"
+
+
+def test_a_line_that_is_never_quiet_is_not_ours() -> None:
+    line = ScriptedLine(first=[(number * 0.001, b"\x55") for number in range(3000)])
+    with pytest.raises(ForeignMasterError):
+        ask(port_on(line)[0])
+    assert line.sent == []
 
 
 def test_a_line_that_breaks_is_told() -> None:
