@@ -14,8 +14,8 @@ from typing import Any, Final
 from app.drivers.contract import Written
 from app.drivers.profibus_bus import ProfibusBus
 from app.drivers.profibus_image import Change
-from app.drivers.profibus_order import ATTEMPTS, OrderCheck, evidence_of
 from app.drivers.profibus_pkw import Failure, PkwJob, Result
+from app.drivers.profibus_startup import Startup
 from app.drivers.profibus_station import Station, StationState
 from app.drivers.urgent import UrgentCommands
 from app.errors import (
@@ -25,7 +25,6 @@ from app.errors import (
     NoAnswerError,
     OvertakenError,
     PkwRefusedError,
-    PreconditionError,
     RefusedError,
     UnverifiedError,
     UsageError,
@@ -35,21 +34,13 @@ from app.model.description import Description, Verify
 from app.wire.profibus import pkw
 from app.wire.profibus.pkw import PkwAnswer, PkwRequest, ReplyKind
 from app.wire.profibus.telegrams import (
-    ACTUAL,
     CONTROL_WORD,
-    RAMP_ACCELERATION,
-    RAMP_DECELERATION,
-    SETPOINT,
-    Part,
     Signal,
 )
 
 DEFAULT_TIMEOUT_S: Final = 2.0
 CONTROLWORD: Final = Address(0, 37, Addressing.PKW)
-STATUSWORD: Final = Address(0, 38, Addressing.PKW)
 _LENGTHS: Final = (1, 2, 4)
-_SOURCES: Final = {SETPOINT: ACTUAL, RAMP_DECELERATION: RAMP_ACCELERATION}
-"""Where a signal's first value comes from, if not from its own parameter: the deceleration has none."""
 
 
 class ProfibusDevice:
@@ -58,17 +49,13 @@ class ProfibusDevice:
     def __init__(self, bus: ProfibusBus, node: int, commands: UrgentCommands) -> None:
         self.node = node
         self.description: Description | None = None
-        self.order_check: OrderCheck | None = None
-        """The latest, None where none was made since the station began to exchange."""
-        self.prepared = 0
-        """Of which start of the station the process data are filled and their order is proven."""
+        self.startup = Startup(self)
         self._bus = bus
         self._commands = commands
-        self._preparing = asyncio.Lock()
 
     def renew(self, bus: ProfibusBus) -> None:
         """The line was closed and is opened again: all that was known of the station is void."""
-        self._bus, self.order_check, self.prepared = bus, None, 0
+        self._bus, self.startup = bus, Startup(self)
 
     @property
     def station(self) -> Station | None:
@@ -79,10 +66,10 @@ class ProfibusDevice:
 
     async def read(self, address: Address, timeout_s: float | None = None, urgent: bool = False) -> bytes:
         """One parameter, least significant byte first. Raises PkwRefusedError, NoAnswerError, BusLostError."""
-        data, _inputs = await self._read(address, timeout_s, urgent)
+        data, _inputs = await self.read_with_inputs(address, timeout_s, urgent)
         return data
 
-    async def _read(self, address: Address, timeout_s: float | None, urgent: bool) -> tuple[bytes, bytes]:
+    async def read_with_inputs(self, address: Address, timeout_s: float | None, urgent: bool) -> tuple[bytes, bytes]:
         """The parameter, and the process data of the exchange that told it."""
         wait_s = self._timeout_s(address, timeout_s)
         answer, _sent, inputs = await self._job(pkw.read(_checked(address)), wait_s, urgent, lambda: None)
@@ -143,11 +130,11 @@ class ProfibusDevice:
             _tell(done, (result, sent, b"" if station is None else station.inputs))
 
         job = PkwJob(request, timeout_s, end, urgent, refusal)
-        self._post(lambda station: station.channel.put(job))
+        self.post(lambda station: station.channel.put(job))
         try:
             return await done
         except asyncio.CancelledError:
-            self._post(lambda station: station.channel.drop(job), lenient=True)
+            self.post(lambda station: station.channel.drop(job), lenient=True)
             raise
 
     # -- process data --------------------------------------------------------------------------------
@@ -169,7 +156,7 @@ class ProfibusDevice:
             reason = f"{value} does not fit into the {signal.bits} bits of process data"
             raise RefusedError(device=str(self.node), address=address.short, reason=reason)
         if value:
-            await self.prepare(address)
+            await self.startup.prepare(address)
         await self.send({signal: value}, address, data, timeout_s, urgent, known)
 
     async def _read_back(self, address: Address, data: bytes) -> Written:
@@ -188,78 +175,21 @@ class ProfibusDevice:
         change = Change(
             values, lambda failure, sent: _tell(done, (failure, sent)), urgent, self._overtaken(address, known)
         )
-        self._post(lambda station: station.image.put(change))
+        self.post(lambda station: station.image.put(change))
         wait_s = self._timeout_s(address, timeout_s)
         try:
             async with asyncio.timeout(wait_s):
                 failure, sent = await done
         except TimeoutError:
-            self._post(lambda station: station.image.drop(change), lenient=True)
+            self.post(lambda station: station.image.drop(change), lenient=True)
             raise NoAnswerError(node=self.node, address=str(address), timeout_s=wait_s, outcome="unknown") from None
         except asyncio.CancelledError:
-            self._post(lambda station: station.image.drop(change), lenient=True)
+            self.post(lambda station: station.image.drop(change), lenient=True)
             raise
         if failure is Failure.GONE and sent:
             raise self._open_outcome(address, data)
         if failure is not None:
             raise self._failed(failure, address, wait_s)
-
-    async def prepare(self, address: Address = CONTROLWORD) -> OrderCheck:
-        """Prove the order of process data and fill them with what the station has; nothing where that is done.
-
-        Raises PreconditionError where the order cannot be proven: ``address`` is what was to be written.
-        """
-        async with self._preparing:
-            station = self.station
-            if station is not None and self.order_check is not None and self.prepared == station.starts:
-                return self.order_check
-            check, starts = await self.check_order(), 0 if station is None else station.starts
-            station, order = self.station, check.proven
-            if order is None or station is None:
-                raise PreconditionError(
-                    address=address.short, name=self.name(address),
-                    needs="a proven order of process data", needs_key="profibus.order.needs",
-                    found=", ".join(f"{one.signal.name}={one.value}" for one in check.evidence),
-                    found_key=check.reason_key,
-                )  # fmt: skip
-            values = await self._present(station)
-            self._post(lambda one: one.fill(order, values, starts))
-            self.prepared = starts
-            return check
-
-    async def check_order(self) -> OrderCheck:
-        """Compare process data with what PKW reads, while the controlword is 0. Raises what reads raise."""
-        evidence = []
-        await self.read(STATUSWORD)  # a station that is not there has no process data either
-        station = self._required()
-        for word in station.telegram.sent:
-            for signal in word:
-                if signal.address is None or signal.part is not Part.WHOLE:
-                    continue
-                for _ in range(ATTEMPTS):
-                    data, inputs = await self._read(signal.address, None, False)
-                    found = evidence_of(station.telegram, signal, data, inputs)
-                    if found.fits:
-                        break
-                evidence.append(found)
-        self.order_check = OrderCheck(tuple(evidence), station.config.order)
-        return self.order_check
-
-    async def _present(self, station: Station) -> dict[Signal, int]:
-        """What the process data have to be so that nothing changes when they come into force.
-
-        The setpoint is where the axis stands: one of before would set it off.
-        """
-        values = {}
-        for word in station.telegram.received:
-            for signal in word:
-                source = _SOURCES.get(signal, signal)
-                if signal is CONTROL_WORD or source.address is None:
-                    continue
-                data = await self.read(source.address)
-                value = int.from_bytes(data, "little", signed=source.signed)
-                values[signal] = min(value, (1 << signal.bits) - 1)
-        return values
 
     # -- errors and names ------------------------------------------------------------------------------
 
@@ -268,7 +198,8 @@ class ProfibusDevice:
         entry = None if self.description is None else self.description.entries.get(address)
         return "" if entry is None else entry.title
 
-    def _required(self) -> Station:
+    def required(self) -> Station:
+        """The station, exchanging data. Raises NoAnswerError where it does not."""
         station = self.station
         if station is None or station.state is not StationState.EXCHANGING:
             raise NoAnswerError(node=self.node, address="Data_Exchange", timeout_s=DEFAULT_TIMEOUT_S)
@@ -291,7 +222,8 @@ class ProfibusDevice:
         if problem is not None:
             raise type(problem)(**problem.details)
 
-    def _post(self, do: Callable[[Station], None], lenient: bool = False) -> None:
+    def post(self, do: Callable[[Station], None], lenient: bool = False) -> None:
+        """Have ``do`` called on the thread of the bus. Raises what ``require_open`` raises, if not ``lenient``."""
         if not lenient:
             self.require_open()
         self._bus.post(lambda bus: do(bus.station(self.node)))

@@ -15,22 +15,22 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Final
 
 from app.drivers.contract import (
-    TWIN_NAME,
     DriverStatus,
     FoundNode,
     FramesCallback,
-    Identity,
     LinkState,
     ProgressCallback,
     Written,
 )
 from app.drivers.profibus_bus import LISTEN_S, ProfibusBus
 from app.drivers.profibus_config import ProfibusConfig, checked, require_node
-from app.drivers.profibus_device import CONTROLWORD, STATUSWORD, ProfibusDevice
+from app.drivers.profibus_device import CONTROLWORD, ProfibusDevice
 from app.drivers.profibus_image import ENABLING
 from app.drivers.profibus_line import Line, SerialLine
 from app.drivers.profibus_order import OrderCheck
-from app.drivers.profibus_probe import Probed, probe
+from app.drivers.profibus_probe import Probed
+from app.drivers.profibus_scan import found_node, is_twin, look
+from app.drivers.profibus_startup import STATUSWORD
 from app.drivers.profibus_station import StationState
 from app.drivers.urgent import UrgentCommands
 from app.errors import (
@@ -51,8 +51,6 @@ from app.wire.profibus.fdl import MAX_ADDRESS
 _LOG: Final = logging.getLogger(__name__)
 SAVE_TIMEOUT_S: Final = 10.0
 """The least time-out of a save: non-volatile memory is slow, and the manual names no time."""
-TWIN_IDENT: Final = 0x0ED2
-"""The ident number of our twins: an example that nobody has given out. That of the ED2 is not printed."""
 _PROGRESS_S: Final = 0.05
 _NS: Final = 1_000_000_000
 Open = Callable[[ProfibusConfig], Line]
@@ -238,7 +236,7 @@ class ProfibusDriver:
 
     async def check_order(self, node: int) -> OrderCheck:
         """The guided check of the order of process data: what PKW reads, compared with them."""
-        return await self._opened(node).check_order()
+        return await self._opened(node).startup.check_order()
 
     # -- the whole device -----------------------------------------------------------------------
 
@@ -293,45 +291,21 @@ class ProfibusDriver:
         found = []
         for number, node in enumerate(wanted, 1):
             require_node(node, master)
-            probed = await self._probe(node)
+            self._opened(node)
+            probed = await look(self._line, node)
             if probed is not None and probed.kind is StationKind.SLAVE:
                 found.append(self._found(node, probed))
             if on_progress is not None:
                 on_progress(number, len(wanted))
         return found
 
-    async def _probe(self, node: int) -> Probed | None:
-        """A station that exchanges data is not asked: it was, and a diagnosis of before is one of now."""
-        self._opened(node)
-        loop = asyncio.get_running_loop()
-        done: asyncio.Future[Probed | None] = loop.create_future()
-
-        def look(bus: ProfibusBus) -> None:
-            station = bus.stations.get(node)
-            known = None if station is None or station.state is StationState.ABSENT else station.probed
-            result: Probed | None = None
-            error: HubsideError | None = BusLostError(bus=self.bus, reason=bus.reason or LinkState.CLOSED.value)
-            try:
-                if bus.port is not None:
-                    result = known or probe(bus.port, node)
-                    error = None
-            finally:  # where the line is lost meanwhile, the bus is told so by what is raised
-                with contextlib.suppress(RuntimeError):  # the loop has ended
-                    loop.call_soon_threadsafe(_settle, done, result, error)
-
-        self._line.post(look)
-        return await done
-
     def _found(self, node: int, probed: Probed) -> FoundNode:
         """The manual prints no ident number: who is named in the configuration is the device, and so is our twin."""
-        ident = None if probed.diagnosis is None else probed.diagnosis.ident
-        named = ident == TWIN_IDENT or any(each.node == node for each in self._config.stations)
+        named = is_twin(probed) or any(each.node == node for each in self._config.stations)
         matching = self._descriptions[0] if len(self._descriptions) == 1 and named else None
         if matching is not None:
             self._device(node).description = matching
-        name = f"{TWIN_NAME} ED2" if ident == TWIN_IDENT else None
-        description_id = None if matching is None else matching.id
-        return FoundNode(node, None, name, None, None, Identity(product=ident), description_id)
+        return found_node(node, probed, matching)
 
     def _opened(self, node: int) -> ProfibusDevice:
         """Raises UsageError, BusLostError, and what keeps the station from being run."""
@@ -349,12 +323,3 @@ class ProfibusDriver:
             if len(self._descriptions) == 1:
                 device.description = self._descriptions[0]
         return device
-
-
-def _settle(done: asyncio.Future[Probed | None], result: Probed | None, error: HubsideError | None) -> None:
-    if done.done():
-        return
-    if error is None:
-        done.set_result(result)
-    else:
-        done.set_exception(error)

@@ -50,7 +50,7 @@ class Wire:
         named = tuple(each if isinstance(each, ProfibusStation) else ProfibusStation(each) for each in stations)
         return ProfibusConfig(self.line.path, self.baud, named)
 
-    def do(self, function: Callable[[], None]) -> None:
+    def do(self, function: Callable[[], object]) -> None:
         """Run it on the thread of the line, and wait for its end."""
         done = threading.Event()
 

@@ -14,13 +14,14 @@ from app.errors import ForeignMasterError
 from app.model.texts import error_text, load_texts
 from app.wire.frame import Direction
 from app.wire.profibus import dp
-from app.wire.profibus.control import Station
+from app.wire.profibus.control import Answer, Station
+from app.wire.profibus.control import Reply as ControlReply
 from app.wire.profibus.fdl import ShortAck, Telegram, Token, decode
 
 BAUD = 19200
 MASTER, SLAVE, OTHER = 2, 6, 1
 STATUS = dp.encode_request(dp.FdlStatus(), MASTER, SLAVE)
-ANSWER = dp.encode_answer(dp.StatusAnswer(Station.SLAVE), STATUS)
+ANSWER = Telegram(MASTER, SLAVE, Answer(ControlReply.OK, Station.SLAVE))
 THERE = ANSWER.encode()
 SIZE = len(THERE)
 ON_TIME_S = wire_s(len(STATUS.encode()) + SIZE, BAUD) + 0.001
@@ -264,7 +265,7 @@ def test_a_line_that_is_never_quiet_is_not_ours() -> None:
 def test_a_line_that_breaks_is_told() -> None:
     line = ScriptedLine()
 
-    def broken(_timeout_s: float) -> Received:
+    def broken(timeout_s: float) -> Received:
         raise LineError("gone")
 
     line.receive = broken  # type: ignore[method-assign]
