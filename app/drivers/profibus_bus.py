@@ -175,7 +175,10 @@ class ProfibusBus:
     def _forget(self, error: BusOpenError | BusLostError) -> None:
         self.error = error
         while self._posted:  # what was handed in by now ends with all the rest
-            self._posted.popleft()(self)
+            try:
+                self._posted.popleft()(self)
+            except Exception:  # noqa: BLE001 - the others are told all the same
+                _LOG.exception("what was handed in to %s failed", self.bus)
         for station in self.stations.values():
             station.lost()
 

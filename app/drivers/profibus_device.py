@@ -240,9 +240,9 @@ class ProfibusDevice:
             return OvertakenError(bus=self._bus.bus, node=self.node, address=address.short)
         if failure is Failure.NOT_READY:
             return RefusedError(device=str(self.node), address=address.short, reason="the station was restarted")
-        if failure is Failure.GONE:
-            error = self._bus.error
-            reason = self._bus.reason if error is None else str(error.details.get("reason", error.code))
+        error = self._bus.error
+        if failure is Failure.GONE and error is not None:
+            reason = str(error.details.get("reason", error.code))
             return BusLostError(bus=self._bus.bus, node=self.node, reason=reason)
         return NoAnswerError(node=self.node, address=str(address), timeout_s=timeout_s)
 

@@ -7,8 +7,11 @@ parity of each byte; one that fails is marked, and told apart from data.
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import os
 import select
+import struct
+import sys
 import termios
 import time
 import tty
@@ -20,6 +23,11 @@ _PTY_MAJORS: Final = range(136, 144)
 _WRITE_S: Final = 1.0
 _CHUNK: Final = 4096
 _MARK: Final = 0xFF
+_TCGETS2: Final = 0x802C542A
+_TCSETS2: Final = 0x402C542B
+_TERMIOS2_SIZE: Final = 44
+"""``struct termios2`` (Linux, asm-generic/termbits.h): input flags first, the rates as numbers at the end."""
+_FLAGS: Final = struct.Struct("@I")
 
 
 class LineError(Exception):
@@ -74,9 +82,7 @@ class SerialLine:
         except serial.SerialException as error:
             raise OSError(_reason(error)) from error
         file: int = self._held.fileno()
-        settings = termios.tcgetattr(file)
-        settings[0] = (settings[0] | termios.INPCK | termios.PARMRK) & ~(termios.IGNPAR | termios.ISTRIP)
-        termios.tcsetattr(file, termios.TCSANOW, settings)
+        mark_parity(file)
         return file
 
     def now_s(self) -> float:
@@ -142,6 +148,24 @@ class Unmarking:
                 broken += 1
                 at += 3
         return Received(bytes(good), broken)
+
+
+def mark_parity(file: int) -> None:
+    """Have bytes with a wrong parity marked (INPCK, PARMRK). Raises OSError, termios.error.
+
+    Linux keeps rates that POSIX does not name in a structure of its own; ``tcsetattr`` would lose them.
+    """
+    wanted, unwanted = termios.INPCK | termios.PARMRK, termios.IGNPAR | termios.ISTRIP
+    if sys.platform != "linux":
+        settings = termios.tcgetattr(file)
+        settings[0] = (settings[0] | wanted) & ~unwanted
+        termios.tcsetattr(file, termios.TCSANOW, settings)
+        return
+    held = bytearray(_TERMIOS2_SIZE)
+    fcntl.ioctl(file, _TCGETS2, held)
+    (flags,) = _FLAGS.unpack_from(held)
+    _FLAGS.pack_into(held, 0, (flags | wanted) & ~unwanted)
+    fcntl.ioctl(file, _TCSETS2, bytes(held))
 
 
 def _open_pty(path: str) -> int:

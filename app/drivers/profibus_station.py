@@ -174,6 +174,7 @@ class Station:
             wanted = "any telegram" if self.config.telegram is None else f"telegram {self.config.telegram}"
             raise UsageError(reason=f"station {self.node} is configured for {lengths}, which are not those of {wanted}")
         self._fits(self, telegram)
+        self.image.forget(Failure.GONE)
         self.image = Image(telegram)
         return plan
 

@@ -74,9 +74,11 @@ class Wire:
 
 
 @contextmanager
-def wire(baud: int = BAUD, settings: Settings | None = None) -> Iterator[Wire]:
-    device = Ed2(ED2, settings or Settings())
-    line = PtyLine(Segment((device.slave,), baud), (device,))
+def wire(baud: int = BAUD, settings: Settings | None = None, *more: Settings) -> Iterator[Wire]:
+    """A twin, and ``more`` on the same line."""
+    devices = [Ed2(ED2, each) for each in (settings or Settings(), *more)]
+    device = devices[0]
+    line = PtyLine(Segment([each.slave for each in devices], baud), devices)
     line.run_until(BOOT_NS)
     thread = PacedThread(line, time.monotonic_ns)
     line.serve(thread)

@@ -48,6 +48,7 @@ from tests.drivers.contract_suite import Bench, DriverContract
 from tests.drivers.profibus_rig import (
     ABSENT,
     ACTUAL,
+    BAUD,
     CONTROLWORD,
     DEADLINE_S,
     ED2,
@@ -65,7 +66,7 @@ from tests.drivers.profibus_rig import (
 )
 from tests.drivers.wire import stamper
 
-OTHER = 1
+OTHER, SECOND_NODE = 1, 7
 SETPOINT_VALUE = ip(12, 21)
 FIRST, SECOND = (100).to_bytes(4, "little"), (200).to_bytes(4, "little")
 
@@ -239,6 +240,22 @@ async def test_a_port_that_goes_away_ends_all_that_waits() -> None:
             await becomes(driver, LinkState.LOST)
             with pytest.raises(NoAnswerError):
                 await driver.read(NODE, STATUSWORD)
+
+
+async def test_two_stations_share_the_line_and_one_that_goes_does_not_stop_the_other() -> None:
+    with wire(BAUD, Settings(), Settings(address=SECOND_NODE, places_mm=(100.0, 100.0))) as line:
+        async with connected(line.config(NODE, SECOND_NODE)) as driver:
+            places = await asyncio.gather(driver.read(NODE, ACTUAL), driver.read(SECOND_NODE, ACTUAL))
+            assert [int.from_bytes(each, "little") for each in places] == [250_000, 100_000]
+            line.power_off()
+            await gone(driver, NODE)
+            assert await driver.read(SECOND_NODE, ACTUAL, timeout_s=DEADLINE_S) == places[1]
+            assert driver.status.state is LinkState.CONNECTED
+
+
+def test_two_stations_that_take_too_long_together_are_refused() -> None:
+    with pytest.raises(UsageError):
+        ProfibusDriver(parse_profibus("/dev/null@9600,6/102,7/102"), stamper())
 
 
 # -- parameters ----------------------------------------------------------------------------------

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import termios
+import tty
 from dataclasses import dataclass, field
 
 import pytest
@@ -15,7 +18,7 @@ from app.drivers.profibus_config import (
     require_fits,
 )
 from app.drivers.profibus_image import Change, Image
-from app.drivers.profibus_line import Received, Unmarking
+from app.drivers.profibus_line import Received, Unmarking, mark_parity
 from app.drivers.profibus_order import OrderCheck, evidence_of
 from app.drivers.profibus_pkw import STILL_S, Failure, PkwChannel, PkwJob, Result
 from app.errors import UsageError
@@ -346,6 +349,23 @@ def test_marks_of_wrong_parity_are_undone_however_they_are_cut(cut: int) -> None
     assert b"".join(part.data for part in parts) == b"\x10\xff\x16\xff\x20"
     assert sum(part.broken for part in parts) == 1
     assert marks.feed(b"\x01") == Received(b"\x01", 0)
+
+
+def test_a_port_is_told_to_mark_parity_and_keeps_all_else() -> None:
+    """A pseudo-terminal has no parity, but the flags of one."""
+    ours, theirs = os.openpty()
+    try:
+        tty.setraw(theirs)
+        before = termios.tcgetattr(theirs)
+        mark_parity(theirs)
+        after = termios.tcgetattr(theirs)
+        assert after[0] == before[0] | termios.INPCK | termios.PARMRK
+        assert after[1:] == before[1:]
+        os.write(ours, b"\x10\xff\x16")
+        assert Unmarking().feed(os.read(theirs, 10)) == Received(b"\x10\xff\x16", 0)
+    finally:
+        os.close(ours)
+        os.close(theirs)
 
 
 # -- the configuration -----------------------------------------------------------------------------------
