@@ -127,7 +127,7 @@ class ProfibusDevice:
 
         def end(result: Result, sent: bool) -> None:
             station = self.station
-            _tell(done, (result, sent, b"" if station is None else station.inputs))
+            tell(done, (result, sent, b"" if station is None else station.inputs))
 
         job = PkwJob(request, timeout_s, end, urgent, refusal)
         self.post(lambda station: station.channel.put(job))
@@ -173,7 +173,7 @@ class ProfibusDevice:
         """Give signals new values at once, and wait until the station has them."""
         done: asyncio.Future[tuple[Failure | None, bool]] = asyncio.get_running_loop().create_future()
         change = Change(
-            values, lambda failure, sent: _tell(done, (failure, sent)), urgent, self._overtaken(address, known)
+            values, lambda failure, sent: tell(done, (failure, sent)), urgent, self._overtaken(address, known)
         )
         self.post(lambda station: station.image.put(change))
         wait_s = self._timeout_s(address, timeout_s)
@@ -272,8 +272,8 @@ def _checked(address: Address) -> Address:
     return address
 
 
-def _tell(done: asyncio.Future[Any], result: Any) -> None:
-    """From the thread of the bus."""
+def tell(done: asyncio.Future[Any], result: Any) -> None:
+    """Settle ``done`` from the thread of the bus."""
 
     def settle() -> None:
         if not done.done():

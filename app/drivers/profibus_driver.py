@@ -24,14 +24,15 @@ from app.drivers.contract import (
 )
 from app.drivers.profibus_bus import LISTEN_S, ProfibusBus
 from app.drivers.profibus_config import ProfibusConfig, checked, require_node
-from app.drivers.profibus_device import CONTROLWORD, ProfibusDevice
-from app.drivers.profibus_image import ENABLING
+from app.drivers.profibus_device import ProfibusDevice
 from app.drivers.profibus_line import Line, SerialLine
 from app.drivers.profibus_order import OrderCheck
 from app.drivers.profibus_probe import Probed
+from app.drivers.profibus_save import save
 from app.drivers.profibus_scan import found_node, is_twin, look
 from app.drivers.profibus_startup import STATUSWORD
 from app.drivers.profibus_station import StationState
+from app.drivers.profibus_view import StationView, look_at
 from app.drivers.urgent import UrgentCommands
 from app.errors import (
     BusLostError,
@@ -39,18 +40,14 @@ from app.errors import (
     DeviceError,
     HubsideError,
     NoAnswerError,
-    PreconditionError,
 )
 from app.model.address import Address
 from app.model.description import Bus, Description, Verify
-from app.model.saving import command_of
 from app.wire.frame import Direction, Fdl, Frame, Stamper
 from app.wire.profibus.control import Station as StationKind
 from app.wire.profibus.fdl import MAX_ADDRESS
 
 _LOG: Final = logging.getLogger(__name__)
-SAVE_TIMEOUT_S: Final = 10.0
-"""The least time-out of a save: non-volatile memory is slow, and the manual names no time."""
 _PROGRESS_S: Final = 0.05
 _NS: Final = 1_000_000_000
 Open = Callable[[ProfibusConfig], Line]
@@ -238,6 +235,14 @@ class ProfibusDriver:
         """The guided check of the order of process data: what PKW reads, compared with them."""
         return await self._opened(node).startup.check_order()
 
+    async def view(self, node: int) -> StationView:
+        """Where the station at ``node`` is, and its process data. Raises BusLostError."""
+        self._device(node)
+        shown = await look_at(self._line, node) if self._open and self._line.error is None else None
+        if shown is None:
+            raise BusLostError(bus=self.bus, node=node, reason=self._line.reason or LinkState.CLOSED.value)
+        return shown
+
     # -- the whole device -----------------------------------------------------------------------
 
     async def save(self, node: int, category: str | None = None) -> None:
@@ -245,20 +250,7 @@ class ProfibusDriver:
 
         Raises PreconditionError (the axis is enabled: nothing was saved), UsageError, and what writes raise.
         """
-        device = self._opened(node)
-        command = command_of(() if device.description is None else device.description.save, category)
-        station = device.station
-        if station is not None and station.image.controlword & ENABLING:
-            raise PreconditionError(
-                address=CONTROLWORD.short,
-                name=device.name(CONTROLWORD),
-                needs="an output stage that is off",
-                needs_key="saving.needs.stage_off",
-                found=f"{station.image.controlword:04X}h",
-            )
-        signature = command.signature.to_bytes(4, "little")
-        timeout_s = max(command.timeout_s, SAVE_TIMEOUT_S)
-        await device.write(command.address, signature, timeout_s, verify=Verify.ACK)
+        await save(self._opened(node), category)
 
     async def bears(self, node: int, stamp: tuple[int, int]) -> bool:
         """A save leaves no mark in this device."""

@@ -15,6 +15,7 @@ from app.drivers.contract import TWIN_NAME, Driver, LinkState, Written
 from app.drivers.profibus import WATCHDOG_MS, plan_of_gsd
 from app.drivers.profibus_config import ProfibusStation, parse_profibus
 from app.drivers.profibus_driver import ProfibusDriver
+from app.drivers.profibus_station import StationState
 from app.drivers.table import driver_class
 from app.errors import (
     BusLostError,
@@ -41,6 +42,7 @@ from app.wire.profibus.dp import Command, DataExchange, GlobalControl, Service, 
 from app.wire.profibus.fdl import Telegram, Token, decode
 from app.wire.profibus.pkw import PkwError
 from app.wire.profibus.pzd import AS_PKW, AS_PRINTED, First, Order, encode_pzd
+from app.wire.profibus.telegrams import ACTUAL as ACTUAL_SIGNAL
 from app.wire.profibus.telegrams import CONTROL_WORD, SETPOINT, TELEGRAM_TYPES, assumed_modules
 from app.wire.profibus.telegrams import RAMP_VELOCITY as RAMP_VELOCITY_SIGNAL
 from app.wire.records import Outcome, SaveSeen, SdoAccess, SdoSeen, SlaveSeen, SlaveState
@@ -130,6 +132,7 @@ def test_without_its_library_an_error_says_how_to_get_it() -> None:
     program = """
 import sys
 sys.modules["pyprofibus"] = None
+from app.drivers.profibus_station import StationState
 from app.drivers.table import driver_class
 from app.errors import ExtraMissingError
 from app.model.description import Bus, Verify
@@ -452,6 +455,30 @@ async def test_a_stop_goes_at_once_and_no_older_command_after_it() -> None:
             assert line.received[CONTROL_WORD] == 0
             reading.cancel()
             await asyncio.gather(reading, return_exceptions=True)
+
+
+async def test_process_data_are_told_by_name_once_their_order_is_proven() -> None:
+    with wire() as line:
+        async with connected(line.config(ProfibusStation(NODE, 102))) as driver:
+            await driver.read(NODE, STATUSWORD)
+            before = await driver.view(NODE)
+            assert (before.state, before.problem) == (StationState.EXCHANGING, None)
+            assert (before.order, before.received, before.sent) == (None, None, None)
+            assert before.diagnosis is not None
+            assert before.diagnosis.ready
+            await driver.write(NODE, CONTROLWORD, b"\7\0", verify=Verify.EFFECT)
+            after = await driver.view(NODE)
+            assert after.order == AS_PKW
+            assert after.received is not None
+            assert after.sent is not None
+            assert after.received[CONTROL_WORD] == 7
+            assert after.sent[ACTUAL_SIGNAL] == pytest.approx(250_000, abs=1000)
+            assert after.age_s is not None
+            assert after.age_s < DEADLINE_S
+            absent = await driver.view(ABSENT)
+            assert (absent.state, absent.age_s) == (StationState.ABSENT, None)
+    with pytest.raises(BusLostError):
+        await driver.view(NODE)
 
 
 async def test_closing_takes_the_controlword_back() -> None:
