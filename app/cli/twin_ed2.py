@@ -6,12 +6,14 @@ import argparse
 from pathlib import Path
 from typing import Final
 
+from app.cli.arguments import seed
 from app.cli.output import Output
 from app.cli.runtime import spare_collector, stop_event
 from app.errors import BusOpenError, UsageError
 from app.model.description_file import load_builtin
 from app.twins.ed2.delivered import ANALOG, INCREMENTAL, SSI_BINARY, SSI_GRAY
 from app.twins.ed2.device import ADDRESS, Ed2, Settings
+from app.twins.ed2.faults import KINDS, FaultPlan, parse_order
 from app.twins.ed2.pty_line import PtyLine
 from app.twins.ed2.segment import BAUD_RATES, Segment
 from app.twins.paced_thread import PacedThread
@@ -42,6 +44,14 @@ def add_parser(kinds: argparse._SubParsersAction[argparse.ArgumentParser]) -> No
         "--pzd-order", choices=sorted(ORDERS), default="high-high", help="which byte and which word come first"
     )
     parser.add_argument("--state", type=Path, metavar="DIR", help="where saved parameters are kept")
+    parser.add_argument(
+        "--fault",
+        action="append",
+        default=[],
+        metavar="KIND@5s,axis=1,...",
+        help=f"put a fault in, with axis=, slave=, value=, for_s= as it needs; may be repeated. {', '.join(KINDS)}",
+    )
+    parser.add_argument("--seed", type=seed, default=0, help="of faults that come by chance")
     parser.add_argument("--while-stdin", action="store_true", help="end when standard input ends, as the caller has")
     parser.set_defaults(run=run)
 
@@ -49,6 +59,7 @@ def add_parser(kinds: argparse._SubParsersAction[argparse.ArgumentParser]) -> No
 def run(arguments: argparse.Namespace, output: Output) -> int:
     """Serve until interrupted. Raises UsageError, and BusOpenError where there is no pseudo terminal."""
     addresses = _addresses(arguments.address)
+    orders = [parse_order(text) for text in arguments.fault]
     spare_collector()
     stop = stop_event(while_stdin=arguments.while_stdin)
     description = load_builtin(DESCRIPTION)
@@ -61,6 +72,10 @@ def run(arguments: argparse.Namespace, output: Output) -> int:
         line = PtyLine(segment, devices)
     except OSError as error:
         raise BusOpenError(bus="pty", reason=error.strerror or str(error)) from error
+    plan = FaultPlan(devices, lambda fault: setattr(line, "fault", fault), arguments.seed)
+    for order in orders:
+        plan.add(order)
+    line.add(plan)
     thread = PacedThread(line, name="ed2")
     line.serve(thread)
     with thread:
