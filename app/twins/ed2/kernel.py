@@ -271,8 +271,4 @@ class Kernel:
         if self.single:
             return HANDS[axis.number - 1]
         chosen = is_on(levels, Input.AXIS_2) == (axis.number == 2)
-        return HANDS[0] if chosen and is_on(levels, SINGLE) else (INPUT_NONE,) * 3
-
-
-INPUT_NONE: Final = 18
-"""An input without a meaning: nothing is wired to it."""
+        return HANDS[0] if chosen and is_on(levels, SINGLE) else (Input.NONE,) * 3

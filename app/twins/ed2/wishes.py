@@ -28,10 +28,12 @@ _PROFILE: Final = 10
 _BIPOLAR: Final = (8, 9)
 """12/220: signals with a sign."""
 _SETPOINT_AT: Final = (12, 21)
-_TAKEN: Final = (
+_MODES: Final = (
     # The mode of operation first: the mode of the device may follow from it.
     (CONTROL_MODE_SET, CONTROL_MODE_AT),
     (DEVICE_MODE_SET, DEVICE_MODE_AT),
+)
+_VALUES: Final = (
     (SETPOINT, _SETPOINT_AT),
     (RAMP_VELOCITY, (12, 61)),
     (RAMP_ACCELERATION, (12, 64)),
@@ -49,8 +51,10 @@ class Wishes:
         """Process data overwrite their parameters (4.4), except locally. OPEN for what is out of range: not taken."""
         if self._kernel.local:
             return
-        for channel in self._channels:
-            for signal, at in _TAKEN:
+        for number, channel in enumerate(self._channels):
+            # Synchronous axes have one mode: that of the first telegram.
+            modes = _MODES if number == 0 or self._kernel.single else ()
+            for signal, at in (*modes, *_VALUES):
                 if signal in channel.received:
                     channel.offer(*at, channel.received[signal])
             if CONTROL_WORD in channel.received:

@@ -61,6 +61,10 @@ def test_every_telegram_can_be_configured_for_one_axis_and_for_two(number: int) 
     assert configuration == dp.ConfigurationAnswer(expected)
 
 
+def test_before_it_is_configured_it_tells_the_telegram_as_delivered() -> None:
+    assert made().master.ask(dp.GetCfg()) == dp.ConfigurationAnswer(assumed_modules(TELEGRAM_TYPES[1]))
+
+
 def test_no_two_configurations_look_alike() -> None:
     assert len(CONFIGURATIONS) == 6 + 36
 
