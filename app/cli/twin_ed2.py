@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from app.cli.arguments import seed
 from app.cli.output import Output
@@ -14,11 +14,13 @@ from app.model.description_file import load_builtin
 from app.twins.ed2.delivered import ANALOG, INCREMENTAL, SSI_BINARY, SSI_GRAY
 from app.twins.ed2.device import ADDRESS, Ed2, Settings
 from app.twins.ed2.faults import KINDS, FaultPlan, parse_order
-from app.twins.ed2.pty_line import PtyLine
 from app.twins.ed2.segment import BAUD_RATES, Segment
 from app.twins.paced_thread import PacedThread
 from app.wire.profibus.fdl import MAX_ADDRESS
 from app.wire.profibus.pzd import First, Order
+
+if TYPE_CHECKING:
+    from app.twins.ed2.pty_line import PtyLine
 
 DESCRIPTION: Final = "wandfluh-ed2"
 TRANSDUCERS: Final = {
@@ -67,11 +69,7 @@ def run(arguments: argparse.Namespace, output: Output) -> int:
     for device in devices:
         for problem in device.problems:
             output.say("cli.twin_problem", reason=problem)
-    segment = Segment([device.slave for device in devices], arguments.baud)
-    try:
-        line = PtyLine(segment, devices)
-    except OSError as error:
-        raise BusOpenError(bus="pty", reason=error.strerror or str(error)) from error
+    line = _line(Segment([device.slave for device in devices], arguments.baud), devices)
     plan = FaultPlan(devices, lambda fault: setattr(line, "fault", fault), arguments.seed)
     for order in orders:
         plan.add(order)
@@ -83,6 +81,16 @@ def run(arguments: argparse.Namespace, output: Output) -> int:
         stop.wait()
     line.close()
     return 0
+
+
+def _line(segment: Segment, devices: list[Ed2]) -> PtyLine:
+    try:
+        # Not every system has pseudo terminals, and there the other commands must run.
+        from app.twins.ed2.pty_line import PtyLine
+
+        return PtyLine(segment, devices)
+    except (ImportError, OSError) as error:
+        raise BusOpenError(bus="pty", reason=str(error)) from error
 
 
 def _addresses(given: list[int] | None) -> list[int]:
