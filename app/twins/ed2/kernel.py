@@ -11,7 +11,7 @@ from app.twins.ed2.delivered import INCREMENTAL
 from app.twins.ed2.digital import HANDS, LIMITS, SINGLE, Forced, Input, is_on, level_of
 from app.twins.ed2.motion import Order
 from app.twins.ed2.params import SYNCHRONOUS_CONTROLLER, ControlMode, Params
-from app.twins.ed2.states import FAULTY, State
+from app.twins.ed2.states import FAULTY, Control, State
 from app.twins.ed2.valve_output import joystick_percent
 
 _SYNC_GAIN: Final = 2.0
@@ -222,7 +222,8 @@ class Kernel:
     def _open_loop(self, axis: Axis, wish: Wish, params: Params, levels: int) -> None:
         """Mode 6: magnets by the joystick, between the limit switches, without an error at them."""
         allowed = axis.state is State.DEVICE_MODE_ACTIVE and is_on(levels, Input.OPEN_LOOP)
-        if allowed and wish.word & 0x6000 == 0x2000:  # start, and not stop
+        axis.reached = False
+        if allowed and wish.word & Control.START and not wish.word & Control.STOP:
             self._by_joystick(axis, params)
         else:
             axis.close()

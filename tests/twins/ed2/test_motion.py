@@ -575,3 +575,20 @@ def test_synchronous_axes_have_the_mode_of_the_first_telegram() -> None:
     master.jobs_of = 1
     master.values[0][CONTROL_MODE_SET] = 9
     assert master.read("0/40") == 9
+
+
+def test_axes_that_were_synchronous_have_handshakes_of_their_own_afterwards() -> None:
+    rig = active(-1, 1, 1)
+    master = rig.master
+    master.set(RUN, 250_000, axis=2)
+    master.set(RUN, 260_000)
+    assert master.set(RUN | START) & ACKNOWLEDGE
+    for axis in (1, 2):
+        master.set(0, axis=axis)
+    master.write("0/53", 1)
+    master.set(RUN, 255_000, axis=2)
+    assert not master.set(RUN, 270_000) & ACKNOWLEDGE
+    assert master.set(RUN | START) & ACKNOWLEDGE
+    assert not master.seen[1][STATUS_WORD] & ACKNOWLEDGE
+    master.until(lambda: bool(master.status & REACHED))
+    assert rig.device.axes[1].position == pytest.approx(250.0, abs=5.0)
