@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -12,7 +13,7 @@ from app.cli.runtime import spare_collector, stop_event
 from app.errors import BusOpenError, UsageError
 from app.model.description_file import load_builtin
 from app.twins.ed2.delivered import ANALOG, INCREMENTAL, SSI_BINARY, SSI_GRAY
-from app.twins.ed2.device import ADDRESS, Ed2, Settings
+from app.twins.ed2.device import ADDRESS, OWN_BENCH, Ed2, Settings
 from app.twins.ed2.faults import KINDS, FaultPlan, parse_order
 from app.twins.ed2.segment import BAUD_RATES, Segment
 from app.twins.paced_thread import PacedThread
@@ -32,6 +33,8 @@ TRANSDUCERS: Final = {
 ORDERS: Final = {f"{byte.value}-{word.value}": Order(byte, word) for byte in First for word in First}
 """Order of bytes in a word and of words in a double word of the process data: which end comes first."""
 BAUD: Final = 500_000
+BENCHES: Final = {"free": OWN_BENCH, "linked": replace(OWN_BENCH, link_n_mm=500.0)}
+"""What both cylinders move: each its own load, or one thing that gives way by a millimetre for 500 N."""
 
 
 def add_parser(kinds: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -42,6 +45,7 @@ def add_parser(kinds: argparse._SubParsersAction[argparse.ArgumentParser]) -> No
         "--address", type=int, action="append", metavar="N", help=f"address on the bus, may be repeated; {ADDRESS}"
     )
     parser.add_argument("--transducer", choices=sorted(TRANSDUCERS), default="ssi-gray", help="position sensors")
+    parser.add_argument("--bench", choices=sorted(BENCHES), default="free", help="whether a link ties both cylinders")
     parser.add_argument(
         "--pzd-order", choices=sorted(ORDERS), default="high-high", help="which byte and which word come first"
     )
@@ -109,6 +113,7 @@ def _settings(arguments: argparse.Namespace, address: int) -> Settings:
         transducer=TRANSDUCERS[arguments.transducer],
         order=ORDERS[arguments.pzd_order],
         state=arguments.state,
+        bench=BENCHES[arguments.bench],
     )
 
 

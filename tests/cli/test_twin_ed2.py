@@ -116,3 +116,12 @@ def test_what_makes_no_sense_is_refused(arguments: list[str]) -> None:
     parsed = build_parser().parse_args(["twin", "ed2", *arguments])
     with pytest.raises(UsageError):
         parsed.run(parsed, Output(load_texts("en"), False))
+
+
+def test_linked_cylinders_hold_each_other_back() -> None:
+    with served("--bench", "linked", "--baud", "1500000") as (_, wire):
+        master = started(wire, 6)
+        master.write("0/53", 1)
+        master.set(0x7 | 0x2000, 450_000)
+        master.until(lambda: master.read("0/36") == 0x8230, 60_000)
+        assert 300_000 < master.actual < 400_000, "the other one stands, and pulls with 500 N a millimetre"
