@@ -15,6 +15,7 @@ from app.model.description_file import load_builtin
 from app.twins.ed2.delivered import ANALOG, INCREMENTAL, SSI_BINARY, SSI_GRAY
 from app.twins.ed2.device import ADDRESS, OWN_BENCH, Ed2, Settings
 from app.twins.ed2.faults import KINDS, FaultPlan, parse_order
+from app.twins.ed2.scenario import load_scenario
 from app.twins.ed2.segment import BAUD_RATES, Segment
 from app.twins.paced_thread import PacedThread
 from app.wire.profibus.fdl import MAX_ADDRESS
@@ -57,7 +58,8 @@ def add_parser(kinds: argparse._SubParsersAction[argparse.ArgumentParser]) -> No
         metavar="KIND@5s,axis=1,...",
         help=f"put a fault in, with axis=, slave=, value=, for_s= as it needs; may be repeated. {', '.join(KINDS)}",
     )
-    parser.add_argument("--seed", type=seed, default=0, help="of faults that come by chance")
+    parser.add_argument("--scenario", type=Path, metavar="FILE", help="faults and their times, from a file")
+    parser.add_argument("--seed", type=seed, help="of faults that come by chance; default: the scenario's, or 0")
     parser.add_argument("--while-stdin", action="store_true", help="end when standard input ends, as the caller has")
     parser.set_defaults(run=run)
 
@@ -65,7 +67,9 @@ def add_parser(kinds: argparse._SubParsersAction[argparse.ArgumentParser]) -> No
 def run(arguments: argparse.Namespace, output: Output) -> int:
     """Serve until interrupted. Raises UsageError, and BusOpenError where there is no pseudo terminal."""
     addresses = _addresses(arguments.address)
-    orders = [parse_order(text) for text in arguments.fault]
+    scenario = None if arguments.scenario is None else load_scenario(arguments.scenario)
+    orders = [*(() if scenario is None else scenario.orders), *map(parse_order, arguments.fault)]
+    chance = arguments.seed if arguments.seed is not None else 0 if scenario is None else scenario.seed
     spare_collector()
     stop = stop_event(while_stdin=arguments.while_stdin)
     description = load_builtin(DESCRIPTION)
@@ -74,7 +78,7 @@ def run(arguments: argparse.Namespace, output: Output) -> int:
         for problem in device.problems:
             output.say("cli.twin_problem", reason=problem)
     line = _line(Segment([device.slave for device in devices], arguments.baud), devices)
-    plan = FaultPlan(devices, lambda fault: setattr(line, "fault", fault), arguments.seed)
+    plan = FaultPlan(devices, lambda fault: setattr(line, "fault", fault), chance)
     for order in orders:
         plan.add(order)
     line.add(plan)

@@ -108,6 +108,14 @@ def test_a_fault_of_the_command_line_happens() -> None:
         master.until(lambda: master.read("0/36") == 0x5232)
 
 
+def test_a_scenario_happens(tmp_path: Path) -> None:
+    path = tmp_path / "supply.toml"
+    path.write_text('title = "Supply"\nduration_s = 9.0\n[[event]]\nat_s = 0.7\nfault = "supply"\n', encoding="utf-8")
+    with served("--scenario", str(path)) as (_, wire):
+        master = started(wire, 6)
+        master.until(lambda: master.read("0/36") == 0x5100)
+
+
 @pytest.mark.parametrize(
     "arguments",
     [["--address", "127"], ["--address", "6", "--address", "6"], ["--fault", "fire"], ["--fault", "supply,slave=9"]],

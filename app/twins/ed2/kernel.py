@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 from app.twins.ed2 import errors
 from app.twins.ed2.axis import Axis
 from app.twins.ed2.delivered import INCREMENTAL
-from app.twins.ed2.digital import HANDS, LIMITS, SINGLE, Forced, Input, is_on, level_of
+from app.twins.ed2.digital import HANDS, INPUTS, LIMITS, OUTPUTS, SINGLE, Forced, Input, is_on, level_of
 from app.twins.ed2.motion import Order
 from app.twins.ed2.params import SYNCHRONOUS_CONTROLLER, ControlMode, Params
 from app.twins.ed2.states import FAULTY, Control, State
@@ -51,8 +51,8 @@ class Kernel:
     def __init__(self, axes: tuple[Axis, Axis], transducer: int) -> None:
         self.axes = axes
         self.conditions = Conditions()
-        self.inputs = Forced(18)
-        self.outputs = Forced(6)
+        self.inputs = Forced(INPUTS)
+        self.outputs = Forced(OUTPUTS)
         self.single = False
         """0/53: two single axes; else both as one, by the mean of their places."""
         self.local = False
