@@ -3,20 +3,26 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
+from app.cli.arguments import seed
 from app.cli.output import Output
 from app.cli.runtime import spare_collector, stop_event
 from app.errors import BusOpenError, UsageError
 from app.model.description_file import load_builtin
 from app.twins.ed2.delivered import ANALOG, INCREMENTAL, SSI_BINARY, SSI_GRAY
-from app.twins.ed2.device import ADDRESS, Ed2, Settings
-from app.twins.ed2.pty_line import PtyLine
+from app.twins.ed2.device import ADDRESS, OWN_BENCH, Ed2, Settings
+from app.twins.ed2.faults import KINDS, FaultPlan, parse_order
+from app.twins.ed2.scenario import load_scenario
 from app.twins.ed2.segment import BAUD_RATES, Segment
 from app.twins.paced_thread import PacedThread
 from app.wire.profibus.fdl import MAX_ADDRESS
 from app.wire.profibus.pzd import First, Order
+
+if TYPE_CHECKING:
+    from app.twins.ed2.pty_line import PtyLine
 
 DESCRIPTION: Final = "wandfluh-ed2"
 TRANSDUCERS: Final = {
@@ -28,6 +34,8 @@ TRANSDUCERS: Final = {
 ORDERS: Final = {f"{byte.value}-{word.value}": Order(byte, word) for byte in First for word in First}
 """Order of bytes in a word and of words in a double word of the process data: which end comes first."""
 BAUD: Final = 500_000
+BENCHES: Final = {"free": OWN_BENCH, "linked": replace(OWN_BENCH, link_n_mm=500.0)}
+"""What both cylinders move: each its own load, or one thing that gives way by a millimetre for 500 N."""
 
 
 def add_parser(kinds: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -38,10 +46,20 @@ def add_parser(kinds: argparse._SubParsersAction[argparse.ArgumentParser]) -> No
         "--address", type=int, action="append", metavar="N", help=f"address on the bus, may be repeated; {ADDRESS}"
     )
     parser.add_argument("--transducer", choices=sorted(TRANSDUCERS), default="ssi-gray", help="position sensors")
+    parser.add_argument("--bench", choices=sorted(BENCHES), default="free", help="whether a link ties both cylinders")
     parser.add_argument(
         "--pzd-order", choices=sorted(ORDERS), default="high-high", help="which byte and which word come first"
     )
     parser.add_argument("--state", type=Path, metavar="DIR", help="where saved parameters are kept")
+    parser.add_argument(
+        "--fault",
+        action="append",
+        default=[],
+        metavar="KIND@5s,axis=1,...",
+        help=f"put a fault in, with axis=, slave=, value=, for_s= as it needs; may be repeated. {', '.join(KINDS)}",
+    )
+    parser.add_argument("--scenario", type=Path, metavar="FILE", help="faults and their times, from a file")
+    parser.add_argument("--seed", type=seed, help="of faults that come by chance; default: the scenario's, or 0")
     parser.add_argument("--while-stdin", action="store_true", help="end when standard input ends, as the caller has")
     parser.set_defaults(run=run)
 
@@ -49,6 +67,9 @@ def add_parser(kinds: argparse._SubParsersAction[argparse.ArgumentParser]) -> No
 def run(arguments: argparse.Namespace, output: Output) -> int:
     """Serve until interrupted. Raises UsageError, and BusOpenError where there is no pseudo terminal."""
     addresses = _addresses(arguments.address)
+    scenario = None if arguments.scenario is None else load_scenario(arguments.scenario)
+    orders = [*(() if scenario is None else scenario.orders), *map(parse_order, arguments.fault)]
+    chance = arguments.seed if arguments.seed is not None else 0 if scenario is None else scenario.seed
     spare_collector()
     stop = stop_event(while_stdin=arguments.while_stdin)
     description = load_builtin(DESCRIPTION)
@@ -56,11 +77,11 @@ def run(arguments: argparse.Namespace, output: Output) -> int:
     for device in devices:
         for problem in device.problems:
             output.say("cli.twin_problem", reason=problem)
-    segment = Segment([device.slave for device in devices], arguments.baud)
-    try:
-        line = PtyLine(segment, devices)
-    except OSError as error:
-        raise BusOpenError(bus="pty", reason=error.strerror or str(error)) from error
+    line = _line(Segment([device.slave for device in devices], arguments.baud), devices)
+    plan = FaultPlan(devices, lambda fault: setattr(line, "fault", fault), chance)
+    for order in orders:
+        plan.add(order)
+    line.add(plan)
     thread = PacedThread(line, name="ed2")
     line.serve(thread)
     with thread:
@@ -68,6 +89,16 @@ def run(arguments: argparse.Namespace, output: Output) -> int:
         stop.wait()
     line.close()
     return 0
+
+
+def _line(segment: Segment, devices: list[Ed2]) -> PtyLine:
+    try:
+        # Not every system has pseudo terminals, and there the other commands must run.
+        from app.twins.ed2.pty_line import PtyLine
+
+        return PtyLine(segment, devices)
+    except (ImportError, OSError) as error:
+        raise BusOpenError(bus="pty", reason=str(error)) from error
 
 
 def _addresses(given: list[int] | None) -> list[int]:
@@ -86,6 +117,7 @@ def _settings(arguments: argparse.Namespace, address: int) -> Settings:
         transducer=TRANSDUCERS[arguments.transducer],
         order=ORDERS[arguments.pzd_order],
         state=arguments.state,
+        bench=BENCHES[arguments.bench],
     )
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from app.model.address import Address
-from app.model.datatypes import Raw
+from app.model.datatypes import Raw, decode_raw
 from app.model.description import Description
 from app.twins.ed2.delivered import SIGNALS, delivered, pkw
 from app.twins.ed2.pkw_server import PkwServer, ReadMore
@@ -37,11 +37,12 @@ class Channel:
         self._transducer = transducer
         self.store = ObjectStore(description, node_id=0)
         file = None if state is None else StateFile(state, f"{description.id}/axis-{axis}")
+        self._delivered = delivered(description, transducer, axis)
         self.memory = NonVolatile(
             self.store,
             file,
             duration_ns=SAVE_NS,
-            delivered=delivered(description, transducer, axis),
+            delivered=self._delivered,
             commanded=False,
         )
         self.pkw = PkwServer(self.store, special, self._written)
@@ -56,10 +57,22 @@ class Channel:
     def recall(self) -> None:
         """Power-on: RAM is what was saved, else the defaults."""
         self.memory.recall(lambda _entry: True)
+        self._make_sound()
         # OPEN: listed as lost without power (4.4). Then it can only be that of the hardware when power comes back.
         self.store.at(pkw(1, 97)).raw = SIGNALS[self._transducer]
         self.pkw.reset()
         self.received, self.changed = {}, True
+
+    def _make_sound(self) -> None:
+        """Where the memory holds no value of an enumeration, the one of delivery stands: none has a printed default."""
+        for address, data in self._delivered.items():
+            cell = self.store.at(address)
+            names = self.store.description.enumeration_of(cell.entry, lambda other: self.store.at(other).now)
+            if names is None:
+                continue
+            known = any(one.value == cell.raw for one in names.values)
+            if address not in self.memory.memory.saved or not known:
+                cell.raw = decode_raw(cell.entry.type, data)
 
     def _written(self) -> None:
         self.changed = True

@@ -78,7 +78,9 @@ class Commands:
         for forced, group in ((self._kernel.inputs, INPUTS_AT), (self._kernel.outputs, OUTPUTS_AT)):
             saved = self._forced_saved.items()
             forced.values = {at.minor: data[0] for at, data in saved if at.major == group[1]}
-        leader = self.channels[0]
+        leader, other = self.channels
+        for at in (LOCAL_AT, AXES_AT):
+            other.put(*at, leader.number(*at))  # power may have gone between the memories of both axes
         self._kernel.local = bool(leader.number(*LOCAL_AT))
         self._kernel.single = bool(leader.number(*AXES_AT))
 

@@ -33,6 +33,8 @@ IDENT_EXAMPLE: Final = 0x0ED2
 """An example: nobody has given it out, and the real one is not printed in the manual."""
 ADDRESS: Final = 6
 """As delivered (manual, 5.4)."""
+DELIVERED: Final = TELEGRAM_TYPES[1]
+"""As delivered (manual, 5.4)."""
 START_MM: Final = 250.0
 OWN_BENCH: Final = Bench()
 _STIRRED: Final = 8
@@ -86,7 +88,7 @@ class Ed2:
         self._stirred = 0
         self._started_ns: int | None = None
         """When power came; None where the device is off."""
-        self.slave = DpSlave(settings.address, IDENT_EXAMPLE, self)
+        self.slave = DpSlave(settings.address, IDENT_EXAMPLE, self, assumed_modules(DELIVERED))
         self.power_on()
 
     def _axis(self, number: int, catalogue: Catalogue) -> Axis:

@@ -32,6 +32,8 @@ class Input(IntEnum):
     RAPID_2 = 15
     LIMIT_POSITIVE_1 = 16
     LIMIT_NEGATIVE_1 = 17
+    NONE = 18
+    """It has no meaning, and nothing is wired to it."""
 
 
 SINGLE: Final = Input.BACKWARD_2

@@ -11,7 +11,7 @@ from enum import Enum
 from typing import Final, NamedTuple, Protocol
 
 from app.wire.profibus import dp
-from app.wire.profibus.configuration import Module, decode_configuration, encode_configuration
+from app.wire.profibus.configuration import Module, decode_configuration
 from app.wire.profibus.control import Ask, Reply, Request, Station
 from app.wire.profibus.diagnosis import NO_MASTER, Diagnosis, Status
 from app.wire.profibus.dp import MASTER_SAP, Command, GlobalControl, Sap, ServiceAnswer, SetPrm
@@ -66,13 +66,17 @@ class _Counted(NamedTuple):
 
 
 class DpSlave:
-    """The slave at ``address``. Times are handed in, ns, and never go back."""
+    """The slave at ``address``. Times are handed in, ns, and never go back.
 
-    def __init__(self, address: int, ident: int, application: Application) -> None:
+    ``modules`` is what it is configured for as delivered: Get_Cfg tells it until a master has told another.
+    """
+
+    def __init__(self, address: int, ident: int, application: Application, modules: tuple[Module, ...]) -> None:
         self.address = address
         self.ident = ident
         self.powered = True
         self._application = application
+        self._modules = self._delivered = modules
         self._restart()
 
     def _restart(self) -> None:
@@ -87,7 +91,7 @@ class DpSlave:
         self._any_ns: int | None = None
         self._counted: _Counted | None = None
         self._sizes = (0, 0)
-        self._modules: tuple[Module, ...] = ()
+        self._modules = self._delivered
         self._groups = 0
         self._may_sync = self._may_freeze = False
         self._outputs: bytes | None = None
@@ -173,7 +177,7 @@ class DpSlave:
             return dp.Refused(Reply.NO_SERVICE)
         serve: dict[int, Callable[[], ServiceAnswer]] = {
             Sap.DIAGNOSIS: lambda: dp.DiagnosisAnswer(self.diagnosis()),
-            Sap.GET_CONFIGURATION: self._configuration,
+            Sap.GET_CONFIGURATION: lambda: dp.ConfigurationAnswer(self._modules),
             Sap.SET_PARAMETERS: lambda: self._set_prm(t_ns, telegram),
             Sap.CHECK_CONFIGURATION: lambda: self._chk_cfg(telegram),
             Sap.READ_INPUTS: lambda: self._read_back(self._application.transmit),
@@ -196,11 +200,6 @@ class DpSlave:
         if self._sync:
             status |= Status.SYNC
         return Diagnosis(status, self.master, self.ident)
-
-    def _configuration(self) -> ServiceAnswer:
-        if not self._modules:
-            return dp.OtherAnswer(Reply.NO_DATA, b"")
-        return dp.OtherAnswer(Reply.DATA_LOW, encode_configuration(self._modules))
 
     def _read_back(self, read: Callable[[], bytes]) -> ServiceAnswer:
         if self.state is not DpState.DATA_EXCHANGE:
@@ -246,8 +245,7 @@ class DpSlave:
         if sizes is None:
             self._leave(Status.CONFIGURATION_FAULT)
         else:
-            if modules != self._modules:
-                self._application.clear()
+            self._application.clear()
             self._sizes, self._modules = sizes, modules
             self.state = DpState.DATA_EXCHANGE
         return dp.Done()
@@ -259,7 +257,7 @@ class DpSlave:
         self._watchdog_ns = self._heard_ns = None
         self._sync = self._cleared = False
         self._frozen = self._outputs = None
-        self._modules, self._sizes = (), (0, 0)
+        self._sizes = (0, 0)
         self._application.clear()
 
     # -- data --------------------------------------------------------------------------------

@@ -14,7 +14,6 @@ JOYSTICK: Final = "ed2_joystick"
 MAGNET_A: Final = "ed2_magnet_a"
 MAGNET_B: Final = "ed2_magnet_b"
 FOLLOWING: Final = "ed2_following"
-GENERAL: Final = "ed2_general"
 
 
 class Known(NamedTuple):

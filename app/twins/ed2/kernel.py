@@ -8,10 +8,10 @@ from typing import Final, NamedTuple
 from app.twins.ed2 import errors
 from app.twins.ed2.axis import Axis
 from app.twins.ed2.delivered import INCREMENTAL
-from app.twins.ed2.digital import HANDS, LIMITS, SINGLE, Forced, Input, is_on, level_of
+from app.twins.ed2.digital import HANDS, INPUTS, LIMITS, OUTPUTS, SINGLE, Forced, Input, is_on, level_of
 from app.twins.ed2.motion import Order
 from app.twins.ed2.params import SYNCHRONOUS_CONTROLLER, ControlMode, Params
-from app.twins.ed2.states import FAULTY, State
+from app.twins.ed2.states import FAULTY, Control, State
 from app.twins.ed2.valve_output import joystick_percent
 
 _SYNC_GAIN: Final = 2.0
@@ -51,8 +51,8 @@ class Kernel:
     def __init__(self, axes: tuple[Axis, Axis], transducer: int) -> None:
         self.axes = axes
         self.conditions = Conditions()
-        self.inputs = Forced(18)
-        self.outputs = Forced(6)
+        self.inputs = Forced(INPUTS)
+        self.outputs = Forced(OUTPUTS)
         self.single = False
         """0/53: two single axes; else both as one, by the mean of their places."""
         self.local = False
@@ -222,7 +222,8 @@ class Kernel:
     def _open_loop(self, axis: Axis, wish: Wish, params: Params, levels: int) -> None:
         """Mode 6: magnets by the joystick, between the limit switches, without an error at them."""
         allowed = axis.state is State.DEVICE_MODE_ACTIVE and is_on(levels, Input.OPEN_LOOP)
-        if allowed and wish.word & 0x6000 == 0x2000:  # start, and not stop
+        axis.reached = False
+        if allowed and wish.word & Control.START and not wish.word & Control.STOP:
             self._by_joystick(axis, params)
         else:
             axis.close()
@@ -271,8 +272,4 @@ class Kernel:
         if self.single:
             return HANDS[axis.number - 1]
         chosen = is_on(levels, Input.AXIS_2) == (axis.number == 2)
-        return HANDS[0] if chosen and is_on(levels, SINGLE) else (INPUT_NONE,) * 3
-
-
-INPUT_NONE: Final = 18
-"""An input without a meaning: nothing is wired to it."""
+        return HANDS[0] if chosen and is_on(levels, SINGLE) else (Input.NONE,) * 3

@@ -37,7 +37,7 @@ class Motion:
     def begin(self, actual: float) -> None:
         """A closed loop begins where the axis is."""
         self.reference.put(actual)
-        self.points.clear()
+        self.points = SetPoints()
         self.target = actual
         self._stream.begin(actual)
 

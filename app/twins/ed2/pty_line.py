@@ -16,6 +16,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Final, Protocol
 
+from app.twins.ed2.dp_line import Fault, to_bytes, to_symbols
 from app.twins.ed2.segment import Segment, Spoken
 from app.twins.paced_thread import PacedThread
 
@@ -43,7 +44,9 @@ class PtyLine:
         self.segment = segment
         self.now_ns = 0
         self.on_handler_error: Callable[[Exception], None] | None = None
-        self._devices = devices
+        self.fault: Fault | None = None
+        """What happens to each answer. A pty has no parity: whatever is flipped arrives as a byte."""
+        self._devices = list(devices)
         self._master, self._slave = os.openpty()
         # The slave's side stays open here: without it a closing master would hang the line up for ever.
         tty.setraw(self._slave, termios.TCSANOW)
@@ -56,6 +59,10 @@ class PtyLine:
         self._spoken: deque[Spoken] = deque()
         self._sent = 0
         """Bytes of the first of them that were written."""
+
+    def add(self, device: Device) -> None:
+        """Let something else live by the time of the line."""
+        self._devices.append(device)
 
     # -- any thread --------------------------------------------------------------------------
 
@@ -95,7 +102,7 @@ class PtyLine:
         while self._heard and self._heard[0][1] <= t_ns:
             start_ns, end_ns, data = self._heard.popleft()
             self._live(end_ns)
-            self._spoken += self.segment.hear(start_ns, end_ns, data)
+            self._spoken += self._suffer(self.segment.hear(start_ns, end_ns, data))
         self._live(t_ns)
         self._write()
 
@@ -124,6 +131,19 @@ class PtyLine:
         end_ns = max(start_ns, self.now_ns) + self.segment.wire_ns(len(data))
         self._free_ns = end_ns
         self._heard.append((start_ns, end_ns, data))
+
+    def _suffer(self, answers: list[Spoken]) -> list[Spoken]:
+        """What the line makes of answers."""
+        if self.fault is None:
+            return answers
+        arriving = []
+        for answer in answers:
+            start_ns = answer.start_ns
+            for part in self.fault(to_symbols(answer.data)):
+                if part:
+                    arriving.append(Spoken(start_ns, to_bytes(part)))
+                start_ns += self.segment.wire_ns(len(part))
+        return arriving
 
     def _piece_ns(self) -> int:
         """When the next piece of the answer is whole."""

@@ -18,6 +18,7 @@ from app.wire.profibus.telegrams import (
     RAMP_DECELERATION,
     RAMP_VELOCITY,
     SETPOINT,
+    Signal,
 )
 
 _RUN: Final = Control.DISABLE | Control.HOLD | Control.ACTIVE
@@ -28,10 +29,14 @@ _PROFILE: Final = 10
 _BIPOLAR: Final = (8, 9)
 """12/220: signals with a sign."""
 _SETPOINT_AT: Final = (12, 21)
-_TAKEN: Final = (
+_Taken = tuple[tuple[Signal, tuple[int, int]], ...]
+"""Signals and the parameters that they overwrite."""
+_MODES: Final[_Taken] = (
     # The mode of operation first: the mode of the device may follow from it.
     (CONTROL_MODE_SET, CONTROL_MODE_AT),
     (DEVICE_MODE_SET, DEVICE_MODE_AT),
+)
+_VALUES: Final[_Taken] = (
     (SETPOINT, _SETPOINT_AT),
     (RAMP_VELOCITY, (12, 61)),
     (RAMP_ACCELERATION, (12, 64)),
@@ -49,10 +54,12 @@ class Wishes:
         """Process data overwrite their parameters (4.4), except locally. OPEN for what is out of range: not taken."""
         if self._kernel.local:
             return
-        for channel in self._channels:
-            for signal, at in _TAKEN:
+        for number, channel in enumerate(self._channels):
+            # Synchronous axes have one mode: that of the first telegram.
+            taken: _Taken = _MODES + _VALUES if number == 0 or self._kernel.single else _VALUES
+            for signal, (ind, pnu) in taken:
                 if signal in channel.received:
-                    channel.offer(*at, channel.received[signal])
+                    channel.offer(ind, pnu, channel.received[signal])
             if CONTROL_WORD in channel.received:
                 channel.store.cell(0, 37).raw = channel.received[CONTROL_WORD]
 

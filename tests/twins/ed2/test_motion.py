@@ -8,14 +8,20 @@ from app.twins.ed2.delivered import ANALOG, INCREMENTAL, SSI_BINARY, SSI_GRAY
 from app.twins.ed2.device import Settings
 from app.twins.ed2.hydraulics import Bench
 from app.twins.ed2.states import State
+from app.wire.profibus import dp
 from app.wire.profibus.pkw import PkwError
+from app.wire.profibus.pzd import ORDERS, Order, orders_that_fit
 from app.wire.profibus.telegrams import (
     ACTUAL,
+    CONTROL_MODE,
+    CONTROL_MODE_SET,
+    DEVICE_MODE_SET,
     RAMP_ACCELERATION,
     RAMP_DECELERATION,
     RAMP_VELOCITY,
     SETPOINT,
     STATUS_WORD,
+    TELEGRAM_TYPES,
 )
 from tests.twins.ed2.rig import Rig, made
 
@@ -510,3 +516,79 @@ def test_the_interface_with_its_own_electronics() -> None:
     master.set(RUN | START)
     master.advance(2_000)
     assert master.actual > 300_500, "an offset of 5 % is held against by a deviation"
+
+
+def test_without_dither_the_axis_does_not_settle() -> None:
+    rig = active(9)
+    master = rig.master
+    master.write("3/101", 0)
+    master.set(RUN | START, 300_000)
+    master.advance(3_000)
+    assert not master.status & REACHED
+
+
+def test_synchronous_by_hand_moves_the_chosen_axis_and_only_with_input_14() -> None:
+    rig = active(9)
+    conditions = rig.device.kernel.conditions
+    rig.master.write("0/41", 1)
+    conditions.levels |= 1 << 9  # input 10: forward
+    rig.master.advance(200)
+    assert not moving(rig, 1)
+    conditions.levels |= 1 << 13  # input 14: single
+    rig.master.advance(300)
+    assert moving(rig, 1)
+    assert not moving(rig, 2)
+    conditions.levels |= 1 << 8  # input 9: axis 2
+    rig.master.advance(600)
+    assert not moving(rig, 1)
+    assert moving(rig, 2)
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_process_data_come_in_the_order_of_the_setting(order: Order) -> None:
+    rig = active(9, 102, settings=Settings(order=order))
+    master = rig.master
+    master.values[0].update({DEVICE_MODE_SET: 1, CONTROL_MODE_SET: 9})
+    master.set(RUN | START, 254_321)
+    master.until(lambda: bool(master.status & REACHED))
+    assert master.actual == pytest.approx(254_321, abs=100)
+    assert master.read("0/38") == master.status
+    assert master.read("12/21") == 254_321
+
+
+def test_process_data_prove_their_order_by_what_pkw_reads() -> None:
+    rig = active(9)
+    master = rig.master
+    inputs = master.ask(dp.DataExchange(master.outputs()))
+    assert isinstance(inputs, dp.Inputs)
+    known = {STATUS_WORD: master.read("0/38"), ACTUAL: master.read("12/100")}
+    assert orders_that_fit(TELEGRAM_TYPES[1].sent, inputs.data[8:], known) == (Settings().order,)
+
+
+def test_synchronous_axes_have_the_mode_of_the_first_telegram() -> None:
+    rig = active(9, 102, 102)
+    master = rig.master
+    master.values[0].update({DEVICE_MODE_SET: 1, CONTROL_MODE_SET: -2})
+    master.values[1].update({DEVICE_MODE_SET: 1, CONTROL_MODE_SET: -1})
+    master.advance(10)
+    assert [seen[CONTROL_MODE] for seen in master.seen] == [-2, -2]
+    master.jobs_of = 1
+    master.values[0][CONTROL_MODE_SET] = 9
+    assert master.read("0/40") == 9
+
+
+def test_axes_that_were_synchronous_have_handshakes_of_their_own_afterwards() -> None:
+    rig = active(-1, 1, 1)
+    master = rig.master
+    master.set(RUN, 250_000, axis=2)
+    master.set(RUN, 260_000)
+    assert master.set(RUN | START) & ACKNOWLEDGE
+    for axis in (1, 2):
+        master.set(0, axis=axis)
+    master.write("0/53", 1)
+    master.set(RUN, 255_000, axis=2)
+    assert not master.set(RUN, 270_000) & ACKNOWLEDGE
+    assert master.set(RUN | START) & ACKNOWLEDGE
+    assert not master.seen[1][STATUS_WORD] & ACKNOWLEDGE
+    master.until(lambda: bool(master.status & REACHED))
+    assert rig.device.axes[1].position == pytest.approx(250.0, abs=5.0)

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from app.twins.ed2.device import Settings
-from app.wire.profibus import pkw
+from app.wire.profibus import dp, pkw
 from app.wire.profibus.pkw import PkwError, ReplyKind
 from tests.twins.ed2.rig import Master, made, where
 
@@ -92,7 +92,6 @@ def test_a_job_that_goes_on_standing_is_done_once(master: Master) -> None:
 def test_what_is_reserved_is_refused(master: Master) -> None:
     slave_job = bytes.fromhex("5027000000000000")
     data = slave_job + master.outputs()[8:]
-    from app.wire.profibus import dp
 
     master.ask(dp.DataExchange(data))
     answer = master.ask(dp.DataExchange(data))

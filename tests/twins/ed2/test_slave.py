@@ -9,7 +9,7 @@ from app.twins.ed2.dp_slave import DpState, WatchdogState
 from app.wire.profibus import dp
 from app.wire.profibus.control import Ask, Reply, Station
 from app.wire.profibus.diagnosis import NO_MASTER, Status
-from app.wire.profibus.fdl import Telegram
+from app.wire.profibus.fdl import SD3, Telegram
 from app.wire.profibus.telegrams import CONTROL_WORD, TELEGRAM_TYPES, assumed_modules
 from tests.twins.ed2.rig import MASTER, Master, Rig, VirtualWire, made, on_pty
 
@@ -59,6 +59,21 @@ def test_every_telegram_can_be_configured_for_one_axis_and_for_two(number: int) 
     configuration = rig.master.ask(dp.GetCfg())
     expected = assumed_modules(TELEGRAM_TYPES[number]) + assumed_modules(TELEGRAM_TYPES[1])
     assert configuration == dp.ConfigurationAnswer(expected)
+
+
+def test_before_it_is_configured_it_tells_the_telegram_as_delivered() -> None:
+    assert made().master.ask(dp.GetCfg()) == dp.ConfigurationAnswer(assumed_modules(TELEGRAM_TYPES[1]))
+
+
+def test_outputs_of_eight_bytes_may_come_in_a_telegram_of_fixed_length() -> None:
+    rig = made()
+    master = rig.master
+    master.start(100)
+    master.values[0][CONTROL_WORD] = 1
+    frame = master.frame(dp.DataExchange(master.outputs()))._replace(fixed=True)
+    assert frame.encode()[0] == SD3
+    assert len(master.wire.exchange(frame.encode())) == 1
+    assert rig.device.outputs_of(1)[CONTROL_WORD] == 1
 
 
 def test_no_two_configurations_look_alike() -> None:
