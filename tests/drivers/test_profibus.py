@@ -132,10 +132,9 @@ def test_without_its_library_an_error_says_how_to_get_it() -> None:
     program = """
 import sys
 sys.modules["pyprofibus"] = None
-from app.drivers.profibus_station import StationState
 from app.drivers.table import driver_class
 from app.errors import ExtraMissingError
-from app.model.description import Bus, Verify
+from app.model.description import Bus
 from app.model.texts import error_text, load_texts
 try:
     driver_class(Bus.PROFIBUS_DP)
