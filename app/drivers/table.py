@@ -19,11 +19,8 @@ EXTRAS: Final = {"pyprofibus": "profibus"}
 
 
 def driver_class(bus: Bus) -> type[Any]:
-    """The driver of ``bus``. Raises UsageError where there is none, ExtraMissingError where its library is missing."""
-    try:
-        module, name = DRIVERS[bus]
-    except KeyError:
-        raise UsageError(reason=f"there is no driver for {bus.value}") from None
+    """The driver of ``bus``. Raises UsageError where its library is missing, ExtraMissingError if an extra brings it."""
+    module, name = DRIVERS[bus]
     try:
         found: type[Any] = getattr(import_module(module), name)
     except ModuleNotFoundError as error:
