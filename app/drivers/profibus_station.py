@@ -16,10 +16,10 @@ from app.drivers.profibus_image import Image
 from app.drivers.profibus_pkw import Failure, PkwChannel
 from app.drivers.profibus_port import ProfibusPort
 from app.drivers.profibus_probe import Probed, clear, leave, probe
-from app.errors import ForeignMasterError, HubsideError, IdentityError, UsageError
+from app.errors import DeviceError, ForeignMasterError, HubsideError, IdentityError, UsageError
 from app.wire.profibus import pkw
 from app.wire.profibus.control import Station as StationKind
-from app.wire.profibus.diagnosis import NO_MASTER, Diagnosis
+from app.wire.profibus.diagnosis import NO_MASTER, Diagnosis, Status
 from app.wire.profibus.pzd import Order
 from app.wire.profibus.telegrams import TELEGRAM_TYPES, Signal, TelegramType, assumed_modules, telegram_of
 
@@ -35,6 +35,8 @@ GONE_AFTER: Final = 2
 """Exchanges without an answer, each of them repeated, after which a station is gone."""
 START_S: Final = 3.0
 """A slave that was parametrised for so long and does not exchange is looked at from the beginning."""
+
+_FAULTS: Final = Status.CONFIGURATION_FAULT | Status.PARAMETER_FAULT
 
 
 class StationState(Enum):
@@ -208,9 +210,19 @@ class Station:
         if not slave.exchanging:  # it never was, or the library has given it up
             gone = gone or self.state is StationState.EXCHANGING or now_s - self._started_s > START_S
         if gone:
+            refusal = self._refusal(slave)
             self._drop()
-            return 0.0
+            self._become(StationState.ABSENT, refusal)
+            return 0.0 if refusal is None else REFUSED_S
         return RETRY_S if came.step is Step.WAITING else 0.0
+
+    def _refusal(self, slave: DpSlave) -> DeviceError | None:
+        """Why it was parametrised and never exchanged anything, as it tells itself."""
+        status = Status(0) if slave.diagnosis is None else slave.diagnosis.status
+        if self.state is not StationState.STARTING or not status & _FAULTS:
+            return None
+        what = "configuration" if status & Status.CONFIGURATION_FAULT else "parameters"
+        return DeviceError(node=self.node, reason_key=f"profibus.refused.{what}")
 
     @property
     def _wanted_soon(self) -> bool:

@@ -19,7 +19,7 @@ EXTRAS: Final = {"pyprofibus": "profibus"}
 
 
 def driver_class(bus: Bus) -> type[Any]:
-    """The driver of ``bus``. Raises UsageError where its library is missing, ExtraMissingError if an extra brings it."""
+    """The driver of ``bus``. Raises UsageError where a library is missing, ExtraMissingError where an extra has it."""
     module, name = DRIVERS[bus]
     try:
         found: type[Any] = getattr(import_module(module), name)

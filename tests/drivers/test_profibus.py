@@ -542,6 +542,21 @@ async def test_a_device_of_another_ident_number_is_not_parametrised(tmp_path: Pa
         assert not any(isinstance(each, SetPrm) for each in said.asked)
 
 
+async def test_a_configuration_that_the_device_refuses_is_told(tmp_path: Path) -> None:
+    """As many bytes, but in modules that the device does not know."""
+    file = _gsd(tmp_path, "Telegram 1")
+    own = b"".join(module.encode() for module in assumed_modules(TELEGRAM_TYPES[102]))
+    content = ", ".join(f"0x{byte:02X}" for byte in own)
+    file.write_text(file.read_text(encoding="latin-1").replace(content, "0xF6"), encoding="latin-1")
+    with wire() as line:
+        async with connected(line.config(ProfibusStation(NODE, None, file, ("Telegram 1",)))) as driver:
+            async with asyncio.timeout(DEADLINE_S):
+                await driver._until(lambda: driver._line.stations[NODE].problem is not None)
+            with pytest.raises(DeviceError) as caught:
+                await driver.read(NODE, STATUSWORD)
+            assert "Chk_Cfg" in error_text(load_texts("en"), caught.value)
+
+
 async def test_a_device_is_configured_by_its_own_file(tmp_path: Path) -> None:
     file = _gsd(tmp_path, "Telegram 102", "Telegram 1")
     with wire() as line:
