@@ -26,6 +26,10 @@ LISTEN_S: Final = 0.5
 SILENT_S: Final = 1.0
 """Without a right answer for so long nobody is connected, whatever state was reached before."""
 _REOPEN_S: Final = (0.2, 0.5, 1.0, 2.0)
+DEAD_MAN_S: Final = 1.0
+"""Whoever commands axes shows that he is there; silent for so long, all of them get a controlword of 0."""
+_STILL_S: Final = 0.3
+"""More than a turn takes: for what goes beyond it the host stood still, and so did everybody."""
 _NOBODY_S: Final = 0.05
 """How often to look where no station is spoken to."""
 
@@ -58,6 +62,8 @@ class ProfibusBus:
         self._tap = tap
         self._on_change = on_change
         self._listen_s = listen_s
+        self._alive = self._seen_alive = 0
+        self._silence_s = self._turned_s = 0.0
         self._posted: deque[Posted] = deque()
         self._wake = threading.Event()
         self._closing = False
@@ -82,6 +88,10 @@ class ProfibusBus:
             thread.join(timeout_s)
             if thread.is_alive():
                 raise TimeoutError
+
+    def alive(self) -> None:
+        """Whoever commands axes is there."""
+        self._alive += 1
 
     def post(self, do: Posted) -> None:
         """Have ``do`` called on the thread of the bus, between two turns."""
@@ -121,6 +131,7 @@ class ProfibusBus:
         while self._posted:
             self._posted.popleft()(self)
         assert self.port is not None  # it was opened
+        self._mind_silence(self.port.line.now_s())
         waits_s = [station.turn(self.port) for station in list(self.stations.values())]
         self._judge()
         return min(waits_s, default=_NOBODY_S)
@@ -181,6 +192,17 @@ class ProfibusBus:
                 _LOG.exception("what was handed in to %s failed", self.bus)
         for station in self.stations.values():
             station.lost()
+
+    def _mind_silence(self, now_s: float) -> None:
+        """The thread would feed the last controlword for ever: where who minds it hangs, the axes are let go."""
+        passed_s, self._turned_s = min(now_s - self._turned_s, _STILL_S), now_s
+        if self._alive != self._seen_alive:
+            self._seen_alive, self._silence_s = self._alive, 0.0
+            return
+        self._silence_s += passed_s
+        if self._silence_s > DEAD_MAN_S:
+            for station in self.stations.values():
+                station.let_go()
 
     def _judge(self) -> None:
         """Connected is who was heard a short while ago, whatever the master believes."""

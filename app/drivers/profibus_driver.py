@@ -49,6 +49,7 @@ from app.wire.profibus.fdl import MAX_ADDRESS
 
 _LOG: Final = logging.getLogger(__name__)
 _PROGRESS_S: Final = 0.05
+_BEAT_S: Final = 0.2
 _NS: Final = 1_000_000_000
 Open = Callable[[ProfibusConfig], Line]
 
@@ -81,6 +82,7 @@ class ProfibusDriver:
         self._loop: asyncio.AbstractEventLoop | None = None
         self._line = self._new_bus()
         self._open = False
+        self._beating: asyncio.Task[None] | None = None
 
     def _new_bus(self) -> ProfibusBus:
         config, open_line = self._config, self._open_line
@@ -116,6 +118,13 @@ class ProfibusDriver:
         if error is not None:
             await self.close()
             raise error
+        self._beating = asyncio.create_task(self._beat())
+
+    async def _beat(self) -> None:
+        """The line lets axes go where this stops: see ``ProfibusBus.alive``."""
+        while True:
+            self._line.alive()
+            await asyncio.sleep(_BEAT_S)
 
     @property
     def _begun(self) -> bool:
@@ -129,6 +138,10 @@ class ProfibusDriver:
         """Bring axes to rest, give the slaves back and close the port; what runs ends with BusLostError."""
         if self._open:
             self._open = False
+            if self._beating is not None:
+                self._beating.cancel()
+                await asyncio.gather(self._beating, return_exceptions=True)
+                self._beating = None
             await asyncio.to_thread(self._line.stop, timeout_s)
 
     @property

@@ -6,13 +6,14 @@ controlword of 0. Whenever it was gone, all of that begins anew.
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Mapping
 from enum import Enum
 from typing import Final
 
 from app.drivers.profibus import DpSlave, Exchange, Plan, Step, plan_of_gsd
 from app.drivers.profibus_config import DELIVERED_TELEGRAM, ProfibusStation
-from app.drivers.profibus_image import Image
+from app.drivers.profibus_image import ENABLING, Change, Image
 from app.drivers.profibus_pkw import Failure, PkwChannel
 from app.drivers.profibus_port import ProfibusPort
 from app.drivers.profibus_probe import Probed, clear, leave, probe
@@ -21,8 +22,16 @@ from app.wire.profibus import pkw
 from app.wire.profibus.control import Station as StationKind
 from app.wire.profibus.diagnosis import NO_MASTER, Diagnosis, Status
 from app.wire.profibus.pzd import Order
-from app.wire.profibus.telegrams import TELEGRAM_TYPES, Signal, TelegramType, assumed_modules, telegram_of
+from app.wire.profibus.telegrams import (
+    CONTROL_WORD,
+    TELEGRAM_TYPES,
+    Signal,
+    TelegramType,
+    assumed_modules,
+    telegram_of,
+)
 
+_LOG: Final = logging.getLogger(__name__)
 PROBE_S: Final = 0.3
 """Between two probes of a station that is not there."""
 REFUSED_S: Final = 1.0
@@ -104,6 +113,12 @@ class Station:
         if starts == self.starts and self.state is StationState.EXCHANGING:
             self.image.order = order
             self.image.values = {**values, **self.image.values}
+
+    def let_go(self) -> None:
+        """Where the axis may be enabled, send a controlword of 0 before anything else."""
+        if self.image.controlword & ENABLING:
+            _LOG.warning("station %d: its controlword is taken back, nobody minds it any more", self.node)
+            self.image.put(Change({CONTROL_WORD: 0}, lambda _failure, _sent: None, urgent=True))
 
     # -- turns ------------------------------------------------------------------------------------
 

@@ -66,7 +66,7 @@ from tests.drivers.profibus_rig import (
     ip,
     wire,
 )
-from tests.drivers.wire import stamper
+from tests.drivers.wire import stamper, until
 
 OTHER, SECOND_NODE = 1, 7
 SETPOINT_VALUE = ip(12, 21)
@@ -478,6 +478,18 @@ async def test_process_data_are_told_by_name_once_their_order_is_proven() -> Non
             assert (absent.state, absent.age_s) == (StationState.ABSENT, None)
     with pytest.raises(BusLostError):
         await driver.view(NODE)
+
+
+async def test_where_the_event_loop_hangs_the_axis_gets_a_controlword_of_0() -> None:
+    """The thread of the bus goes on by itself: it must not go on feeding what nobody minds any more."""
+    with wire() as line:
+        async with connected(line.config(NODE)) as driver:
+            await driver.write(NODE, CONTROLWORD, b"\7\0", verify=Verify.EFFECT)
+            assert line.received[CONTROL_WORD] == 7
+            until(lambda: line.received[CONTROL_WORD] == 0)  # polls in the loop's own thread: nothing else runs there
+            assert driver._line.stations[NODE].state is StationState.EXCHANGING
+            await driver.write(NODE, CONTROLWORD, b"\7\0", verify=Verify.EFFECT)
+            assert line.received[CONTROL_WORD] == 7
 
 
 async def test_closing_takes_the_controlword_back() -> None:
