@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from heapq import heappop, heappush
+from math import floor, inf, log, log1p
 from random import Random
 from typing import Final
 
@@ -20,6 +21,7 @@ Symbols = tuple[int, ...]
 Fault = Callable[[Symbols], Sequence[Symbols]]
 """What arrives of one transmission: nothing, itself, or others, one after another."""
 _PARITY: Final = 0x100
+_BITS: Final = 9
 
 
 def to_symbols(data: bytes) -> Symbols:
@@ -131,6 +133,8 @@ class LineNoise:
         self._lost = lost
         self._doubled = doubled
         self._truncated = truncated
+        self._passed_over = self._gap()
+        """Bits that arrive as they are before the next one flips."""
         self.counts = {"bit_errors": 0, "lost": 0, "doubled": 0, "truncated": 0}
         """What it has done so far; ``bit_errors`` counts bits."""
 
@@ -149,13 +153,22 @@ class LineNoise:
         return happens
 
     def _flipped(self, symbols: Symbols) -> Symbols:
-        if self._bit_errors <= 0.0:
+        """Bits flip one by one: what is drawn is how many are passed over until the next one does."""
+        bits = _BITS * len(symbols)
+        if self._passed_over >= bits:
+            self._passed_over -= bits
             return symbols
-        told = []
-        for symbol in symbols:
-            for bit in range(9):
-                if self._random.random() < self._bit_errors:
-                    symbol ^= 1 << bit
-                    self.counts["bit_errors"] += 1
-            told.append(symbol)
+        told = list(symbols)
+        while self._passed_over < bits:
+            place, bit = divmod(int(self._passed_over), _BITS)
+            told[place] ^= 1 << bit
+            self.counts["bit_errors"] += 1
+            self._passed_over += 1 + self._gap()
+        self._passed_over -= bits
         return tuple(told)
+
+    def _gap(self) -> float:
+        """Bits until the next one that flips."""
+        if self._bit_errors <= 0.0:
+            return inf
+        return 0.0 if self._bit_errors >= 1.0 else floor(log(1.0 - self._random.random()) / log1p(-self._bit_errors))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import select
 import termios
+import threading
 import tty
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -36,7 +37,7 @@ from app.wire.profibus.telegrams import (
 
 MS: Final = 1_000_000
 MASTER: Final = 2
-SLOT_MS: Final = 20
+PATIENCE_MS: Final = 200
 
 
 class RefusedError(Exception):
@@ -91,21 +92,26 @@ class PtyWire:
 
     def exchange(self, data: bytes) -> list[AnyTelegram]:
         os.write(self._handle, data)
-        told: list[AnyTelegram] = []
-        for _ in range(200):
-            self._clock.now_ns += MS
-            self._thread.call_soon(lambda: None)
-            ready, _, _ = select.select([self._handle], (), (), 0.005)
-            if ready:
-                pieces = self._splitter.feed(os.read(self._handle, 4096))
-                told += [decode(piece.data) for piece in pieces if isinstance(piece, Found)]
+        for _ in range(PATIENCE_MS):
+            self.wait(1)
+            pieces = self._splitter.feed(self.read())
+            told = [decode(piece.data) for piece in pieces if isinstance(piece, Found)]
             if told:
-                break
-        return told
+                return told
+        return []
+
+    def read(self) -> bytes:
+        """What there is to read; the system hands bytes of a pty on when it finds the time, so it gets a moment."""
+        ready, _, _ = select.select([self._handle], (), (), 0.003)
+        return os.read(self._handle, 4096) if ready else b""
 
     def wait(self, ms: int) -> None:
+        """Let time pass: when this returns the twin has read what was written, and has lived until then."""
         self._clock.now_ns += ms * MS
-        self._thread.call_soon(lambda: None)
+        for _ in range(2):
+            done = threading.Event()
+            self._thread.call_soon(done.set)
+            assert done.wait(30), "the twin's thread stands still"
 
     def close(self) -> None:
         os.close(self._handle)

@@ -133,3 +133,15 @@ def test_the_line_says_when_something_will_happen() -> None:
     assert due_ns is not None
     rig.line.run_until(due_ns)
     assert len(rig.line.receive()) == 1
+
+
+@pytest.mark.parametrize("share", [0.0, 0.0001, 0.01, 0.5, 1.0])
+def test_as_many_bits_flip_as_are_asked_for(share: float) -> None:
+    noise, sent = LineNoise(3, bit_errors=share), to_symbols(bytes(range(40)))
+    flipped = 0
+    for _ in range(2_000):
+        (told,) = noise(sent)
+        flipped += sum((one ^ other).bit_count() for one, other in zip(sent, told, strict=True))
+    assert flipped == noise.counts["bit_errors"]
+    bits = 2_000 * 40 * 9
+    assert flipped == pytest.approx(share * bits, rel=0.3 if share < 0.001 else 0.05)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import select
 
 from app.model.description_file import load_builtin
 from app.twins.ed2.device import Ed2, Settings
@@ -21,12 +20,18 @@ IS_THERE = dp.StatusAnswer(Station.SLAVE)
 
 def test_a_request_in_two_pieces_is_one_request() -> None:
     with on_pty() as (_, master, wire):
-        assert wire.exchange(STATUS[:2]) == []
-        told = wire.exchange(STATUS[2:])
-        if not told:  # so long a pause between the pieces counts as silence: the request must come whole
-            told = wire.exchange(STATUS)
-        assert len(told) == 1
+        os.write(wire._handle, STATUS[:2])
+        wire.wait(1)
+        assert len(wire.exchange(STATUS[2:])) == 1
         master.start()
+
+
+def test_after_a_long_pause_the_rest_of_a_request_is_none() -> None:
+    with on_pty() as (_, master, wire):
+        assert wire.exchange(STATUS[:2]) == []
+        assert wire.exchange(STATUS[2:]) == []
+        wire.wait(50)
+        assert master.ask(dp.FdlStatus()) == IS_THERE
 
 
 def test_an_answer_comes_in_pieces_as_its_characters_become_whole() -> None:
@@ -37,10 +42,11 @@ def test_an_answer_comes_in_pieces_as_its_characters_become_whole() -> None:
         pieces: list[bytes] = []
         for _ in range(400):
             wire.wait(1)
-            if select.select([wire._handle], (), (), 0.01)[0]:
-                pieces.append(os.read(wire._handle, 4096))
-                if pieces[-1][-1:] == b"\x16" and len(b"".join(pieces)) == 17:
-                    break
+            piece = wire.read()
+            if piece:
+                pieces.append(piece)
+            if len(b"".join(pieces)) == 17:
+                break
         assert len(pieces) > 3
         decode(b"".join(pieces))
 
