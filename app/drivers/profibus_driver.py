@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import logging
-import threading
 import time
 from collections.abc import Callable, Iterable, Sequence
 from typing import Final
@@ -32,6 +30,7 @@ from app.drivers.profibus_save import save
 from app.drivers.profibus_scan import found_node, is_twin, look
 from app.drivers.profibus_startup import STATUSWORD
 from app.drivers.profibus_station import StationState
+from app.drivers.profibus_taps import Taps
 from app.drivers.profibus_view import StationView, look_at
 from app.drivers.urgent import UrgentCommands
 from app.errors import (
@@ -43,14 +42,12 @@ from app.errors import (
 )
 from app.model.address import Address
 from app.model.description import Bus, Description, Verify
-from app.wire.frame import Direction, Fdl, Frame, Stamper
+from app.wire.frame import Stamper
 from app.wire.profibus.control import Station as StationKind
 from app.wire.profibus.fdl import MAX_ADDRESS
 
-_LOG: Final = logging.getLogger(__name__)
 _PROGRESS_S: Final = 0.05
 _BEAT_S: Final = 0.2
-_NS: Final = 1_000_000_000
 Open = Callable[[ProfibusConfig], Line]
 
 
@@ -73,8 +70,7 @@ class ProfibusDriver:
         self._stamper = stamper
         self._descriptions = tuple(each for each in descriptions if each.bus is Bus.PROFIBUS_DP)
         self._commands = UrgentCommands()
-        self._subscribers: list[FramesCallback] = []
-        self._tapping = threading.RLock()
+        self._taps = Taps(bus, stamper)
         self._devices: dict[int, ProfibusDevice] = {}
         self._open_line = open_line
         self._listen_s = listen_s
@@ -87,7 +83,7 @@ class ProfibusDriver:
     def _new_bus(self) -> ProfibusBus:
         config, open_line = self._config, self._open_line
         return ProfibusBus(
-            config, self.bus, self._stamper, lambda: open_line(config), self._tap, self._tell_change, self._listen_s
+            config, self.bus, self._stamper, lambda: open_line(config), self._taps, self._tell_change, self._listen_s
         )
 
     # -- the link -------------------------------------------------------------------------
@@ -152,24 +148,7 @@ class ProfibusDriver:
 
     def subscribe(self, callback: FramesCallback) -> Callable[[], None]:
         """See Driver."""
-        with self._tapping:
-            self._subscribers = [*self._subscribers, callback]
-
-        def unsubscribe() -> None:
-            with self._tapping:  # once this returns, the callback is not called any more
-                self._subscribers = [each for each in self._subscribers if each is not callback]
-
-        return unsubscribe
-
-    def _tap(self, direction: Direction, data: bytes, age_s: float) -> None:
-        (t_ns,) = self._stamper.take_aged((int(age_s * _NS),))
-        frame = Frame(t_ns, self.bus, direction, Fdl(data))
-        with self._tapping:
-            for subscriber in self._subscribers:
-                try:
-                    subscriber([frame])
-                except Exception:  # noqa: BLE001 - whatever a subscriber does, the others and the wire go on
-                    _LOG.exception("a subscriber of %s failed", self.bus)
+        return self._taps.subscribe(callback)
 
     def _tell_change(self) -> None:
         """On the thread of the bus."""
