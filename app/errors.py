@@ -13,6 +13,7 @@
     │   ├── MotorFileError                  a file of motors: file, line, column, reason
     │   ├── BundleError                     a bundle of an incident cannot be opened: file, reason
     │   ├── SigningKeyError                 the key that seals records cannot be made or read
+    │   ├── ExtraMissingError               an optional package is not installed; says how to get it
     │   └── StoreError                      the store cannot be opened, read or written
     │       ├── StoreDamagedError           its file is damaged
     │       ├── StoreInUseError             another process has the data folder
@@ -94,10 +95,12 @@
     ├── DeviceError                exit 4   the device answered and refused
     │   ├── SdoAbortError                   CiA 301 abort code
     │   ├── ModbusExceptionError            Modbus exception code
+    │   ├── PkwRefusedError                 error code of the PKW channel
     │   └── IdentityError                   another device than expected answered
     ├── NoAnswerError              exit 5   nothing came in time
     │   ├── BusLostError                    the adapter or its server is gone
     │   ├── BusOpenError                    the adapter could not be opened
+    │   │   └── ForeignMasterError              another master is on a line that has room for one
     │   └── TwinsGoneError                  the twins that we started do not answer
     ├── UnverifiedError            exit 6   sent, but what was read back differs or could not be read
     │   ├── BatteryCommandError             a command to the battery management has no effect
@@ -179,6 +182,12 @@ class SigningKeyError(UsageError):
     """The key that seals records cannot be made or read. Details: file, reason."""
 
     code = "signing_key"
+
+
+class ExtraMissingError(UsageError):
+    """What is asked for needs a package that is not installed. Details: package, extra (of ours, which brings it)."""
+
+    code = "extra_missing"
 
 
 class ForeignFileError(UsageError):
@@ -716,6 +725,15 @@ class ModbusExceptionError(DeviceError):
     code = "modbus_exception"
 
 
+class PkwRefusedError(DeviceError):
+    """The device refused a job of the PKW channel (ED2 manual, 4.6).
+
+    Details: node, address, name, pkw_code (int), text_key_reason.
+    """
+
+    code = "pkw_refused"
+
+
 class IdentityError(DeviceError):
     """Another device than the expected one answered. Details: node, expected, found."""
 
@@ -739,6 +757,12 @@ class BusOpenError(NoAnswerError):
     """The adapter could not be opened. Details: bus, reason."""
 
     code = "bus_open"
+
+
+class ForeignMasterError(BusOpenError):
+    """Somebody else talks on a line on which only one master may: nothing is sent. Details: bus, reason_key, master."""
+
+    code = "foreign_master"
 
 
 class TwinsGoneError(NoAnswerError):

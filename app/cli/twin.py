@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from app.cli import twin_fault, twin_pd4e, twin_record
+from app.cli import twin_ed2, twin_fault, twin_pd4e, twin_record
 from app.cli.arguments import bitrate, milliseconds, seed, wind
 from app.cli.output import Output
 from app.cli.runtime import spare_collector, stop_event
@@ -56,6 +56,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     )
     oat.set_defaults(run=run)
     twin_pd4e.add_parser(kinds)
+    twin_ed2.add_parser(kinds)
     twin_fault.add_parser(kinds)
     twin_record.add_parser(kinds)
 

@@ -8,7 +8,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
-from app.errors import HubsideError, ModbusExceptionError, SdoAbortError
+from app.errors import HubsideError, ModbusExceptionError, PkwRefusedError, SdoAbortError
 
 LANGUAGES: Final = ("en", "de")
 
@@ -69,10 +69,13 @@ class _Dashes(dict[str, str]):
 
 
 def error_text(texts: Texts, error: HubsideError) -> str:
-    """The operator's text of an error; abort and exception codes are given in words, the number behind."""
+    """The operator's text of an error; codes of devices are given in words, the number behind."""
     details = dict(error.details)
     if isinstance(error, ModbusExceptionError):
         details["reason"] = texts(str(details.get("text_key_reason", "modbus.exception.unknown")))
+    if isinstance(error, PkwRefusedError):
+        words = texts(str(details.get("text_key_reason", "profibus.pkw.unknown")))
+        details["reason"] = f"{words} (code {details.get('pkw_code')})"
     if isinstance(error, SdoAbortError):
         words = texts(str(details.get("text_key_reason", "abort.unknown")))
         details["reason"] = f"{words} (abort code {error.abort_code:08X}h)"

@@ -47,6 +47,13 @@ class Simulation(Protocol):
         """Let everything happen that is due by then."""
 
 
+class Readable(Protocol):
+    """A socket, or something else with a descriptor that can be waited for."""
+
+    def fileno(self) -> int:
+        """The descriptor."""
+
+
 class PacedThread:
     """The thread of one simulation. ``monotonic_ns`` is its clock; simulated time goes on from where it stands.
 
@@ -73,8 +80,8 @@ class PacedThread:
         """Time in all that was skipped because the host stood still."""
         self.offset_ns = 0
         """The clock's time less the simulation's; grows where time is skipped."""
-        self._readers: dict[socket.socket, Callable[[], None]] = {}
-        self._writers: dict[socket.socket, Callable[[], None]] = {}
+        self._readers: dict[Readable, Callable[[], None]] = {}
+        self._writers: dict[Readable, Callable[[], None]] = {}
         self._after: list[Callable[[], None]] = []
         self._soon: deque[Callable[[], None]] = deque()
         self._wake_rx, self._wake_tx = socket.socketpair()
@@ -129,11 +136,11 @@ class PacedThread:
         """Let the simulation come to the present: what is done to it next is done now, not at its last step."""
         self._step()
 
-    def on_readable(self, sock: socket.socket, function: Callable[[], None] | None) -> None:
+    def on_readable(self, sock: Readable, function: Callable[[], None] | None) -> None:
         """Call ``function`` whenever ``sock`` is readable; None ends that."""
         self._set(self._readers, sock, function)
 
-    def on_writable(self, sock: socket.socket, function: Callable[[], None] | None) -> None:
+    def on_writable(self, sock: Readable, function: Callable[[], None] | None) -> None:
         """Call ``function`` whenever ``sock`` is writable; None ends that."""
         self._set(self._writers, sock, function)
 
@@ -148,9 +155,7 @@ class PacedThread:
     # -- inside ------------------------------------------------------------------------
 
     @staticmethod
-    def _set(
-        table: dict[socket.socket, Callable[[], None]], sock: socket.socket, function: Callable[[], None] | None
-    ) -> None:
+    def _set(table: dict[Readable, Callable[[], None]], sock: Readable, function: Callable[[], None] | None) -> None:
         if function is None:
             table.pop(sock, None)
         else:

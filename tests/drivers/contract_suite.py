@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import time
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 
 import pytest
@@ -18,7 +19,8 @@ from app.wire.frame import Direction, Frame
 class Bench:
     """A driver that is connected, and what it will find.
 
-    ``writable`` takes ``first`` and ``second``; ``remanent`` is an object that a restart sets back.
+    ``writable`` takes ``first`` and ``second``, and a restart sets it back. ``switch`` switches a device off and on
+    that has no command to restart: the driver then waits for that.
     """
 
     driver: Driver
@@ -31,6 +33,7 @@ class Bench:
     read_only: Address
     read_only_data: bytes
     unknown: Address
+    switch: Callable[[], Awaitable[None]] | None = None
 
 
 class DriverContract:
@@ -128,7 +131,11 @@ class DriverContract:
         before = await bench.driver.read(bench.node, bench.writable)
         changed = bench.first if before != bench.first else bench.second
         await bench.driver.write(bench.node, bench.writable, changed)
-        await bench.driver.restart(bench.node)
+        restarting = asyncio.ensure_future(bench.driver.restart(bench.node))
+        await asyncio.sleep(0)
+        if bench.switch is not None:
+            await bench.switch()
+        await restarting
         assert await bench.driver.read(bench.node, bench.writable) == before
 
     async def test_a_restart_of_an_absent_device_is_no_answer(self, bench: Bench) -> None:

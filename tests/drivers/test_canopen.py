@@ -15,7 +15,7 @@ from app.drivers.can_config import CanConfig, CanInterface
 from app.drivers.canopen import GATHER_S, CanOpenDriver
 from app.drivers.contract import Driver, LinkState, MasterSign, Written
 from app.drivers.table import driver_class
-from app.errors import BusLostError, BusOpenError, ConsentError, NoAnswerError, RefusedError, SdoAbortError, UsageError
+from app.errors import BusLostError, BusOpenError, ConsentError, NoAnswerError, RefusedError, SdoAbortError
 from app.model.address import Address
 from app.model.description import Bus, Verify
 from app.twins.line import Fault, delay
@@ -84,9 +84,8 @@ def test_the_table_knows_the_driver(line: Wire) -> None:
     assert kept_to.status.state is LinkState.CLOSED
 
 
-def test_a_bus_without_a_driver_is_a_usage_error() -> None:
-    with pytest.raises(UsageError):
-        driver_class(Bus.PROFIBUS_DP)
+def test_every_bus_that_a_description_may_name_has_a_driver() -> None:
+    assert len({driver_class(bus) for bus in Bus}) == len(Bus)
 
 
 async def test_it_is_ready_once_connect_returns(line: Wire) -> None:

@@ -11,7 +11,7 @@ from app.wire.profibus import pkw
 from app.wire.profibus.pkw import AskKind, ReplyKind
 from app.wire.profibus.pkw_follower import Ended, PkwFollower
 from app.wire.profibus.pzd import First, Order, decode_pzd
-from app.wire.profibus.telegrams import TELEGRAM_TYPES, TelegramType, Words
+from app.wire.profibus.telegrams import TelegramType, Words, telegram_of
 from app.wire.records import (
     Outcome,
     Protocol,
@@ -28,8 +28,6 @@ from app.wire.records import (
 
 LOST_AFTER: Final = 3
 """Requests in a row without an answer; a master repeats each of them once or more."""
-_BY_SIZE: Final = {(one.output_size, one.input_size): one for one in TELEGRAM_TYPES.values()}
-"""No two telegrams exchange as many bytes both ways."""
 
 
 class Slave:
@@ -61,7 +59,7 @@ class Slave:
 
     def exchanged(self, t_ns: int, outputs: bytes, inputs: bytes, client: Direction, base: int) -> list[Record]:
         """One Data_Exchange, with the inputs at ``base`` of their telegram. Raises FormatError on no PKW."""
-        telegram = _BY_SIZE.get((len(outputs), len(inputs)))
+        telegram = telegram_of(len(outputs), len(inputs))
         if telegram is None or self.description is None or self.description.bus is not Bus.PROFIBUS_DP:
             return []
         records = self._process_data(t_ns, telegram, outputs, inputs)

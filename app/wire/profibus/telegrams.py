@@ -117,6 +117,13 @@ TELEGRAM_TYPES: Final = {
     )
 }
 
+_BY_SIZE: Final = {(one.output_size, one.input_size): one for one in TELEGRAM_TYPES.values()}
+
+
+def telegram_of(output_size: int, input_size: int) -> TelegramType | None:
+    """The type that exchanges so many bytes; no two of them have both lengths in common."""
+    return _BY_SIZE.get((output_size, input_size))
+
 
 def assumed_modules(telegram: TelegramType) -> tuple[Module, ...]:
     """The configuration of a telegram as usual makers would have it: the GSD of the device is the one that decides.
