@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from app.errors import UsageError
@@ -155,3 +157,8 @@ def test_every_kind_begins_and_ends() -> None:
     for word in (0, 0x8, 0):
         rig.master.set(word, 0)
     assert rig.master.read("0/36") == 0
+
+
+def test_the_page_of_the_twin_names_every_kind() -> None:
+    page = (Path(__file__).resolve().parents[3] / "docs" / "twin-ed2.md").read_text(encoding="utf-8")
+    assert [kind for kind in KINDS if f"`{kind}`" not in page] == []
