@@ -69,7 +69,7 @@ def test_it_is_in_german_by_keyboard_and_without_complaints_of_axe(home: Home) -
     expect(page.get_by_test_id("search-start")).to_be_enabled()
     field.press("Enter")
     expect(page.get_by_test_id("search-progress")).to_have_attribute("data-state", "done", timeout=WAIT_MS)
-    expect(page.get_by_test_id("search-progress")).to_contain_text("von 9 Aufzeichnungen")
+    expect(page.get_by_test_id("search-progress")).to_contain_text("von 10 Aufzeichnungen")
     page.evaluate(AXE.read_text(encoding="utf-8"))
     complaints = page.evaluate("axe.run().then(r => r.violations.map(v => v.id + ': ' + v.nodes[0].html))")
     assert complaints == []
