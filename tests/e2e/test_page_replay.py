@@ -22,7 +22,7 @@ WAIT_MS: Final = 60_000
 TRIP: Final = "3-following-error"
 PMC_2: Final = "wtg-07/blade-2/pmc"
 AXE: Final = ROOT / "frontend" / "node_modules" / "axe-core" / "axe.min.js"
-SAMPLES: Final = sorted(path.stem for path in (ROOT / "recordings" / "scenarios").glob("*.mcap"))
+SAMPLES: Final = sorted(path.stem for path in (ROOT / "recordings" / "scenarios").glob("[0-9]-*.mcap"))
 S: Final = 1_000_000_000
 CLOCK: Final = "Number(document.querySelector('[data-testid=replay-clock]')?.dataset.ns)"
 expect.set_options(timeout=30_000)

@@ -20,7 +20,7 @@ from app.wire.records import ValueSeen
 from app.wire.signs import Sign, SignFinder, folded
 
 FOLDER = Path(__file__).resolve().parents[2] / "recordings" / "scenarios"
-SCENARIOS = sorted(FOLDER.glob("*.mcap"))
+SCENARIOS = sorted(FOLDER.glob("[0-9]-*.mcap"))
 TIMES = 6
 
 

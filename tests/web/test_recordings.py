@@ -34,6 +34,8 @@ async def test_the_running_recording_and_a_finished_one_are_listed(server: Serve
     sample = next(one for one in listed["files"] if one["name"] == "sample.mcap")
     assert sample["summary"]["frames"] > 1000
     assert sample["summary"]["last_ns"] > sample["summary"]["first_ns"]
+    listed_samples = {one["name"] for one in listed["files"] if one["sample"]}
+    assert {"1-normal-operation.mcap", "pd4e-bench.mcap"} <= listed_samples
 
 
 async def test_one_recording_tells_its_contents_and_gives_its_bytes(server: Server) -> None:

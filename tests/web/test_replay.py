@@ -446,7 +446,7 @@ async def test_a_page_that_was_late_hears_that_the_replay_was_opened_again(serve
 
 
 async def test_more_replays_than_are_kept_end_the_one_that_nobody_looks_at(server: Server, tmp_path: Path) -> None:
-    names = sorted(path.stem for path in SCENARIOS.glob("*.mcap"))
+    names = sorted(path.stem for path in SCENARIOS.glob("[0-9]-*.mcap"))
     for name in names:
         await opened(server, name)
     unwatch = server.replays.watch(f"replay/{names[0]}")
