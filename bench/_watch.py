@@ -17,7 +17,7 @@ from app.wire.nmt import NmtCommand
 AXES: Final = (11, 12, 13)
 REST_S: Final = 20.0
 LOOK_S: Final = 0.05
-_AT_REST: Final = (AxisState.SWITCH_ON_DISABLED, AxisState.READY)
+_AT_REST: Final = (AxisState.SWITCH_ON_DISABLED, AxisState.READY, AxisState.SWITCHED_ON)
 _ENABLE: Final = (
     (CONTROLWORD, b"\x06\x00"),  # first: the mode is not changed while bit 3 is set, as it is after STOP
     (Address(0x6060), b"\x03"),

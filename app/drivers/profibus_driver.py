@@ -60,6 +60,7 @@ class ProfibusDriver:
     """The stations of ``config`` as the bus ``bus``. ``stamper`` gives frames their times."""
 
     ends_when_silent: Final = True
+    ends_with_restart: Final = False
 
     def __init__(
         self, config: ProfibusConfig, stamper: Stamper, bus: str = "profibus0",

@@ -28,7 +28,7 @@ from app.web.problem import NotFoundError
 from app.web.routes import api_router, incidents
 from app.web.socket import serve_client
 from app.web.static import PageFiles, page_folder
-from app.web.urgent import commands_of
+from app.web.urgent import Presses
 from app.web.viser_proxy import viser_router
 
 
@@ -49,11 +49,12 @@ def create_app(
     app.state.access = access
     files = PageFiles(page or page_folder())
     replays: Replays = app.state.replays
+    presses: Presses = app.state.presses
 
     @app.websocket("/api/ws")
     async def socket(websocket: WebSocket) -> None:
         person: SignedIn = websocket.scope[SIGNED_IN]
-        commands = commands_of(bench, person.person)
+        commands = presses.of(bench, person.person)
         await serve_client(websocket, LiveShown(bench), replays, time.monotonic, lambda: bench.motion, commands)
 
     app.include_router(incidents.links)
@@ -111,6 +112,7 @@ def create_api(bench: Bench | None, scene: HubScene | None = None, language: str
     )
     app.state.bench = bench
     app.state.replays = _replays(bench)
+    app.state.presses = Presses()
     app.state.replay_scenes = ReplayScenes(app.state.replays.shown)
     app.state.language = language
     app.include_router(api_router())

@@ -61,6 +61,7 @@ OF_A_DEVICE: Final[tuple[HubsideError, ...]] = (
 
 BODIES: Final[dict[str, Any]] = {
     "Nothing": {},
+    "Press": {"page": "5f0c9a11d2e84b37", "number": 1},
     "ConnectRequest": {"turbine": "wtg-07"},
     "OpenReplayRequest": {"recording": "3-following-error.mcap"},
     "MomentSetsRequest": {"devices": ["wtg-07/blade-2/pmc"], "reason": "before the trip"},

@@ -26,7 +26,7 @@ async def server(connection: Connection, tmp_path: Path) -> AsyncIterator[Server
 
 async def told(page: Page, command: str, number: int, **more: Any) -> tuple[dict[str, Any], dict[str, Any]]:
     """What is said of a command: at first, and at its end."""
-    await page.say({"type": "urgent", "command": command, "number": number, **more})
+    await page.say({"type": "urgent", "page": "p", "command": command, "number": number, **more})
     first = await page.until("urgent", lambda data: data["number"] == number)
     return first["data"], (await page.until("urgent", lambda data: data["number"] == number))["data"]
 
@@ -58,7 +58,7 @@ async def test_one_axis_alone_is_told(server: Server) -> None:
 
 async def test_a_page_that_goes_away_has_stopped_all_the_same(server: Server) -> None:
     async with server.socket() as connection:
-        await connection.send(json.dumps({"type": "urgent", "command": "stop", "number": 1}))
+        await connection.send(json.dumps({"type": "urgent", "page": "p", "command": "stop", "number": 1}))
         await Page(connection).until("urgent")
     async with server.socket() as connection:  # what was begun is told to nobody, and comes to its end
         await Page(connection).until("hello")
@@ -74,7 +74,7 @@ async def test_a_bus_that_is_gone_fails_and_no_connection_is_not_taken(server: S
         assert {axis["how"] for axis in last["done"]["axes"]} == {"failed"}
         assert {axis["error"]["code"] for axis in last["done"]["axes"]} == {"bus_lost"}
         server.bench.connection = None
-        await page.say({"type": "urgent", "command": "stop", "number": 2})
+        await page.say({"type": "urgent", "page": "p", "command": "stop", "number": 2})
         answer = await page.until("urgent")
         assert answer["data"] == {"number": 2, "taken": False, "done": None}
 
@@ -91,10 +91,28 @@ async def test_a_command_that_fails_by_a_defect_sends_the_page_another_way(
         assert last == {"number": 1, "taken": False, "done": None}
 
 
-@pytest.mark.parametrize("wrong", [{"command": "start"}, {"number": "x"}, {"force": True}])
+async def test_what_comes_both_ways_is_done_once_and_what_comes_late_not_at_all(server: Server) -> None:
+    """A request that waited behind others in the browser must not undo what was commanded since."""
+    async with server.socket() as connection:
+        page = Page(connection)
+        _, feathered = await told(page, "feather", 1)
+        again = (await server.client.post("/api/live/feather", json={"page": "p", "number": 1})).json()
+        assert again == feathered["done"], "the very same, by its times"
+        _, stopped = await told(page, "stop", 2)
+        late = (await server.client.post("/api/live/feather", json={"page": "p", "number": 1})).json()
+        assert [axis["how"] for axis in late["axes"]] == ["replaced"] * 3
+        other = (await server.client.post("/api/live/stop", json={"page": "q", "number": 1})).json()
+        assert [axis["how"] for axis in other["axes"]] != ["replaced"] * 3, "another page counts for itself"
+        uncounted = (await server.client.post("/api/live/stop", json={})).json()
+        assert uncounted["axes"][0]["sent_t_ns"] > stopped["done"]["axes"][0]["sent_t_ns"]
+    sent = [kind for kind, _ in await kinds(server) if kind in ("stop_sent", "feather_sent")]
+    assert sorted(sent) == ["feather_sent", "stop_sent", "stop_sent", "stop_sent"]
+
+
+@pytest.mark.parametrize("wrong", [{"command": "start"}, {"number": 0}, {"page": ""}, {"force": True}])
 async def test_what_is_no_command_closes_the_socket(server: Server, wrong: dict[str, Any]) -> None:
     async with server.socket() as connection:
-        await connection.send(json.dumps({"type": "urgent", "command": "stop", "number": 1, **wrong}))
+        await connection.send(json.dumps({"type": "urgent", "page": "p", "command": "stop", "number": 1, **wrong}))
         with pytest.raises(websockets.ConnectionClosed) as closed:
             while True:
                 await connection.recv()

@@ -133,6 +133,16 @@ class Nothing(BaseModel):
     """An empty object: the request needs nothing more."""
 
 
+class Press(BaseModel):
+    """Which STOP or FEATHER of which page, counted by the page; nulls where nobody counts.
+
+    The same may come by a request and over the socket: it is done once, and after a later one of the page not at all.
+    """
+
+    page: Annotated[str, Field(min_length=1, max_length=64)] | None = None
+    number: Annotated[int, Field(ge=1, le=2**53)] | None = None
+
+
 class Failure(BaseModel):
     """What did not succeed, and why. ``address`` is empty where it is about the whole job."""
 
@@ -443,15 +453,16 @@ class Beat(BaseModel):
 class Urgent(BaseModel):
     """STOP or FEATHER to every axis, or to that of ``device``; ``urgent`` of the same ``number`` answers.
 
-    Here as well as by a request: a browser has six connections to a server, and where each of them waits for the end of
-    something long, a request waits until one is free.
+    ``page`` and ``number`` as in ``Press``. Here as well as by a request: a browser has six connections to a server,
+    and where each of them waits for the end of something long, a request waits until one is free.
     """
 
     model_config = ConfigDict(extra="forbid")
 
     type: Literal["urgent"]
     command: Literal["stop", "feather"]
-    number: int
+    page: Annotated[str, Field(min_length=1, max_length=64)]
+    number: Annotated[int, Field(ge=1, le=2**53)]
     device: Annotated[str, Field(max_length=200)] | None = None
 
 

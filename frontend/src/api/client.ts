@@ -130,9 +130,9 @@ export const commands = {
   restart: (slug: string) => post<RestartResult>(`${device(slug)}/restart`, {}),
   verify: (slug: string) => post<VerifyResult>(`${device(slug)}/verify`, {}),
   consent: () => post<object>("/api/live/consent", {}),
-  stop: () => post<StopResult>("/api/live/stop", {}),
-  feather: () => post<StopResult>("/api/live/feather", {}),
-  stopOne: (slug: string) => post<StopResult>(`${device(slug)}/stop`, {}),
+  stop: (press: object) => post<StopResult>("/api/live/stop", press),
+  feather: (press: object) => post<StopResult>("/api/live/feather", press),
+  stopOne: (slug: string, press: object) => post<StopResult>(`${device(slug)}/stop`, press),
   backup: (reason: string) => post<Job>("/api/live/backup", { reason }),
   cancel: (id: string) => request<Job>(`/api/live/jobs/${id}`, { method: "DELETE" }),
 };

@@ -8166,6 +8166,18 @@ export interface components {
             visit: components["schemas"]["VisitDoc"] | null;
         };
         /**
+         * Press
+         * @description Which STOP or FEATHER of which page, counted by the page; nulls where nobody counts.
+         *
+         *     The same may come by a request and over the socket: it is done once, and after a later one of the page not at all.
+         */
+        Press: {
+            /** Number */
+            number?: number | null;
+            /** Page */
+            page?: string | null;
+        };
+        /**
          * ProbeLine
          * @description A probe as a page sees it. Degrees; times in t_ns; None: not known, or not yet.
          *
@@ -10828,8 +10840,8 @@ export interface components {
          * Urgent
          * @description STOP or FEATHER to every axis, or to that of ``device``; ``urgent`` of the same ``number`` answers.
          *
-         *     Here as well as by a request: a browser has six connections to a server, and where each of them waits for the end of
-         *     something long, a request waits until one is free.
+         *     ``page`` and ``number`` as in ``Press``. Here as well as by a request: a browser has six connections to a server,
+         *     and where each of them waits for the end of something long, a request waits until one is free.
          */
         Urgent: {
             /**
@@ -10844,6 +10856,8 @@ export interface components {
             device: string | null;
             /** Number */
             number: number;
+            /** Page */
+            page: string;
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
@@ -17641,8 +17655,13 @@ export interface operations {
         };
         requestBody: {
             content: {
-                /** @example {} */
-                "application/json": components["schemas"]["Nothing"];
+                /**
+                 * @example {
+                 *       "number": 1,
+                 *       "page": "5f0c9a11d2e84b37"
+                 *     }
+                 */
+                "application/json": components["schemas"]["Press"];
             };
         };
         responses: {
@@ -18033,8 +18052,13 @@ export interface operations {
         };
         requestBody: {
             content: {
-                /** @example {} */
-                "application/json": components["schemas"]["Nothing"];
+                /**
+                 * @example {
+                 *       "number": 1,
+                 *       "page": "5f0c9a11d2e84b37"
+                 *     }
+                 */
+                "application/json": components["schemas"]["Press"];
             };
         };
         responses: {
@@ -19605,8 +19629,13 @@ export interface operations {
         };
         requestBody: {
             content: {
-                /** @example {} */
-                "application/json": components["schemas"]["Nothing"];
+                /**
+                 * @example {
+                 *       "number": 1,
+                 *       "page": "5f0c9a11d2e84b37"
+                 *     }
+                 */
+                "application/json": components["schemas"]["Press"];
             };
         };
         responses: {

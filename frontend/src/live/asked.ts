@@ -19,7 +19,7 @@ export class Asked {
   private number = 0;
   private readonly waiting = new Map<number, Waiting>();
 
-  /** The number to ask under, and what comes of it. */
+  /** The number to ask under, higher than all before, and what comes of it. */
   ask(): [number, Command] {
     const number = ++this.number;
     let taken: Waiting["taken"] = () => undefined;

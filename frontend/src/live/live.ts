@@ -37,8 +37,12 @@ export const liveStore = live.store;
 let socket: LiveSocket | null = null;
 
 export function startLive(): void {
+  started();
+}
+
+function started(): LiveSocket {
   const scheme = location.protocol === "https:" ? "wss" : "ws";
-  socket ??= new LiveSocket(`${scheme}://${location.host}/api/ws`, live);
+  return (socket ??= new LiveSocket(`${scheme}://${location.host}/api/ws`, live));
 }
 
 /** Say that this page holds an axis, or that it does not; false where the socket is not open. */
@@ -48,7 +52,7 @@ export function sendBeat(beat: Beat): boolean {
 
 /** STOP or FEATHER, by the quickest way there is. */
 export function sendUrgent(urgent: Urgent): Promise<StopResult> {
-  return commandBy((one) => socket?.command(one) ?? null, urgent);
+  return commandBy((one) => started().command(one), urgent);
 }
 
 /** A channel for a recording, or the bench's where none is named. */

@@ -9,9 +9,15 @@ import { Asked, type Command } from "./asked";
 import { Backoff } from "./backoff";
 import { DeafnessTimer } from "./deafness";
 import type { Channel } from "./channel";
+import { PAGE } from "./page";
 
 /** What a page with the lease says: that it is there, and whether its person holds what moves an axis. */
 export type Beat = Omit<Schemas["Beat"], "type">;
+/** Which of this page: sent both ways, it is done once. */
+export interface Press {
+  readonly page: string;
+  readonly number: number;
+}
 type Schemas = components["schemas"];
 
 /** STOP or FEATHER, to every axis or that of one device. */
@@ -121,10 +127,11 @@ export class LiveSocket {
     return this.say({ type: "beat", ...beat });
   }
 
-  /** STOP or FEATHER ahead of all requests; null where the socket is not open. */
-  command(urgent: Urgent): Command | null {
+  /** STOP or FEATHER ahead of all requests; `command` null where the socket is not open. */
+  command(urgent: Urgent): { press: Press; command: Command | null } {
     const [number, command] = this.urgent.ask();
-    return this.say({ type: "urgent", number, ...urgent }) ? command : null;
+    const press = { page: PAGE, number };
+    return { press, command: this.say({ type: "urgent", ...press, ...urgent }) ? command : null };
   }
 
   private say(request: object): boolean {

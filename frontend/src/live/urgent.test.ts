@@ -5,6 +5,12 @@ import { commandBy, TAKEN_MS } from "./urgent";
 const OVER_SOCKET = { axes: [] };
 const BY_REQUEST = { axes: [] };
 const STOP = { command: "stop" } as const;
+const PRESS = { page: "p", number: 1 };
+
+function asking(asked: Asked) {
+  const [number, command] = asked.ask();
+  return { press: { page: "p", number }, command };
+}
 
 describe("STOP", () => {
   beforeEach(() => {
@@ -17,7 +23,7 @@ describe("STOP", () => {
   it("goes over the socket, and no request is made of it", async () => {
     const asked = new Asked();
     const request = vi.fn();
-    const answer = commandBy(() => asked.ask()[1], STOP, request);
+    const answer = commandBy(() => asking(asked), STOP, request);
     asked.told({ number: 1, taken: true, done: null });
     await vi.advanceTimersByTimeAsync(10 * TAKEN_MS);
     asked.told({ number: 1, taken: true, done: OVER_SOCKET });
@@ -27,18 +33,19 @@ describe("STOP", () => {
 
   it("is a request at once where the socket is not open", async () => {
     const request = vi.fn().mockResolvedValue(BY_REQUEST);
-    expect(await commandBy(() => null, STOP, request)).toBe(BY_REQUEST);
-    expect(request).toHaveBeenCalledWith(STOP);
+    expect(await commandBy(() => ({ press: PRESS, command: null }), STOP, request)).toBe(BY_REQUEST);
+    expect(request).toHaveBeenCalledWith(STOP, PRESS);
   });
 
   it("is a request as well where the server says nothing, and the first answer counts", async () => {
     const asked = new Asked();
     const request = vi.fn().mockReturnValue(new Promise(() => undefined));
-    const answer = commandBy(() => asked.ask()[1], STOP, request);
+    const answer = commandBy(() => asking(asked), STOP, request);
     await vi.advanceTimersByTimeAsync(TAKEN_MS - 1);
     expect(request).not.toHaveBeenCalled();
     await vi.advanceTimersByTimeAsync(1);
     expect(request).toHaveBeenCalledTimes(1);
+    expect(request).toHaveBeenCalledWith(STOP, PRESS);
     asked.told({ number: 1, taken: true, done: OVER_SOCKET });
     expect(await answer).toBe(OVER_SOCKET);
   });
@@ -50,7 +57,7 @@ describe("STOP", () => {
     ]) {
       const asked = new Asked();
       const request = vi.fn().mockResolvedValue(BY_REQUEST);
-      const answer = commandBy(() => asked.ask()[1], STOP, request);
+      const answer = commandBy(() => asking(asked), STOP, request);
       end(asked);
       expect(await answer).toBe(BY_REQUEST);
     }
@@ -59,7 +66,7 @@ describe("STOP", () => {
   it("says what the request says where both fail", async () => {
     const asked = new Asked();
     const request = vi.fn().mockRejectedValue(new Error("refused"));
-    const answer = commandBy(() => asked.ask()[1], STOP, request);
+    const answer = commandBy(() => asking(asked), STOP, request);
     asked.lost();
     await expect(answer).rejects.toThrow("refused");
   });
@@ -67,7 +74,7 @@ describe("STOP", () => {
   it("that the server took and then failed at is a request", async () => {
     const asked = new Asked();
     const request = vi.fn().mockResolvedValue(BY_REQUEST);
-    const answer = commandBy(() => asked.ask()[1], STOP, request);
+    const answer = commandBy(() => asking(asked), STOP, request);
     asked.told({ number: 1, taken: true, done: null });
     asked.told({ number: 1, taken: false, done: null });
     expect(await answer).toBe(BY_REQUEST);
@@ -76,7 +83,7 @@ describe("STOP", () => {
   it("that was taken when the socket was lost is sent once more", async () => {
     const asked = new Asked();
     const request = vi.fn().mockResolvedValue(BY_REQUEST);
-    const answer = commandBy(() => asked.ask()[1], STOP, request);
+    const answer = commandBy(() => asking(asked), STOP, request);
     asked.told({ number: 1, taken: true, done: null });
     await vi.advanceTimersByTimeAsync(0);
     asked.lost();

@@ -1,3 +1,4 @@
+import { PAGE } from "../live/page";
 /** The lease as this page has it: taken, asked for, given back; one for all rooms of the page. */
 import { useMutation } from "@tanstack/react-query";
 import { useEffect } from "react";
@@ -6,10 +7,7 @@ import type { MotionData } from "../api/types";
 import { liveStore, sendBeat, useHearing, useMotion } from "../live/live";
 import { Holding } from "./holding";
 
-/** A name that this page has until it is loaded anew: a copy of the tab is another page. */
-export const PAGE = [...crypto.getRandomValues(new Uint8Array(8))]
-  .map((octet) => octet.toString(16).padStart(2, "0"))
-  .join("");
+export { PAGE };
 
 export const holding = new Holding(PAGE, sendBeat);
 
