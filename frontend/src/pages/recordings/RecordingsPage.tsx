@@ -256,7 +256,7 @@ function columnsOf(
     {
       id: "state",
       title: title("state"),
-      width: "minmax(158px, 0.9fr)",
+      width: "minmax(186px, 0.9fr)",
       fixed: true,
       text: (file) =>
         [
@@ -328,7 +328,7 @@ function columnsOf(
     {
       id: "turbine",
       title: title("turbine"),
-      width: "minmax(70px, 0.7fr)",
+      width: "minmax(92px, 0.7fr)",
       text: (file) => orDash(file.summary?.turbine.toUpperCase()),
     },
     {
