@@ -86,11 +86,17 @@ export function get<T>(path: string, signal?: AbortSignal): Promise<T> {
   return request<T>(path, { method: "GET", ...(signal ? { signal } : {}) });
 }
 
-export function send<T>(method: "POST" | "PUT" | "PATCH", path: string, body: object): Promise<T> {
+export function send<T>(
+  method: "POST" | "PUT" | "PATCH",
+  path: string,
+  body: object,
+  signal?: AbortSignal,
+): Promise<T> {
   return request<T>(path, {
     method,
     headers: { "content-type": "application/json" },
     body: JSON.stringify(body),
+    ...(signal ? { signal } : {}),
   });
 }
 
@@ -130,9 +136,11 @@ export const commands = {
   restart: (slug: string) => post<RestartResult>(`${device(slug)}/restart`, {}),
   verify: (slug: string) => post<VerifyResult>(`${device(slug)}/verify`, {}),
   consent: () => post<object>("/api/live/consent", {}),
-  stop: (press: object) => post<StopResult>("/api/live/stop", press),
-  feather: (press: object) => post<StopResult>("/api/live/feather", press),
-  stopOne: (slug: string, press: object) => post<StopResult>(`${device(slug)}/stop`, press),
+  stop: (press: object, signal: AbortSignal) => send<StopResult>("POST", "/api/live/stop", press, signal),
+  feather: (press: object, signal: AbortSignal) =>
+    send<StopResult>("POST", "/api/live/feather", press, signal),
+  stopOne: (slug: string, press: object, signal: AbortSignal) =>
+    send<StopResult>("POST", `${device(slug)}/stop`, press, signal),
   backup: (reason: string) => post<Job>("/api/live/backup", { reason }),
   cancel: (id: string) => request<Job>(`/api/live/jobs/${id}`, { method: "DELETE" }),
 };

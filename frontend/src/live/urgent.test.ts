@@ -1,6 +1,7 @@
 import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
 import { Asked } from "./asked";
-import { commandBy, TAKEN_MS } from "./urgent";
+import { Unreachable } from "../api/client";
+import { byRequest, commandBy, GIVE_UP_MS, TAKEN_MS } from "./urgent";
 
 const OVER_SOCKET = { axes: [] };
 const BY_REQUEST = { axes: [] };
@@ -88,5 +89,29 @@ describe("STOP", () => {
     await vi.advanceTimersByTimeAsync(0);
     asked.lost();
     expect(await answer).toBe(BY_REQUEST);
+  });
+
+  it("that nobody answers is taken back, and its person is told", async () => {
+    const asked: { url: string; signal: AbortSignal }[] = [];
+    const hanging = (url: string, { signal }: { signal: AbortSignal }) =>
+      new Promise((_, reject) => {
+        asked.push({ url, signal });
+        signal.addEventListener("abort", () => reject(new DOMException("aborted", "AbortError")));
+      });
+    vi.stubGlobal("fetch", hanging);
+    vi.stubGlobal("location", { search: "" });
+    for (const [urgent, url] of [
+      [STOP, "/api/live/stop"],
+      [{ command: "feather" }, "/api/live/feather"],
+      [{ command: "stop", device: "t/b/pmc" }, "/api/live/devices/t/b/pmc/stop"],
+    ] as const) {
+      const answer = byRequest(urgent, PRESS);
+      const told = expect(answer).rejects.toThrow(Unreachable);
+      await vi.advanceTimersByTimeAsync(GIVE_UP_MS - 1);
+      expect(asked.at(-1)).toMatchObject({ url, signal: { aborted: false } });
+      await vi.advanceTimersByTimeAsync(1);
+      await told;
+    }
+    vi.unstubAllGlobals();
   });
 });

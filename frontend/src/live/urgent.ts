@@ -14,9 +14,19 @@ export const TAKEN_MS = 100;
 type Ask = (urgent: Urgent) => { press: Press; command: Command | null };
 type Send = (urgent: Urgent, press: Press) => Promise<StopResult>;
 
-const byRequest: Send = ({ command, device }, press) => {
-  if (device !== undefined) return commands.stopOne(device, press);
-  return command === "stop" ? commands.stop(press) : commands.feather(press);
+/** A request that has no answer for so long is taken back: nobody expects what it commands any more. */
+export const GIVE_UP_MS = 5000;
+
+/** Rejects as requests do, with Unreachable where nothing is answered. */
+export const byRequest: Send = async ({ command, device }, press) => {
+  const giving = new AbortController();
+  const timer = setTimeout(() => giving.abort(), GIVE_UP_MS);
+  try {
+    if (device !== undefined) return await commands.stopOne(device, press, giving.signal);
+    return await (command === "stop" ? commands.stop : commands.feather)(press, giving.signal);
+  } finally {
+    clearTimeout(timer);
+  }
 };
 
 /** By whichever way is answered first; the server does it once. Rejects as the request does. */
