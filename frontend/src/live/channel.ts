@@ -31,10 +31,11 @@ export class Channel {
   private changed: () => void = () => undefined;
   private gone: () => void = () => undefined;
 
-  constructor(ctx: string, schedule: (flush: () => void) => void) {
+  /** `pace` gives each store a schedule of its own. */
+  constructor(ctx: string, pace: () => (flush: () => void) => void) {
     this.ctx = ctx;
-    this.store = new LiveStore(schedule, () => Date.now(), ctx !== LIVE);
-    this.frames = new FrameStore(schedule);
+    this.store = new LiveStore(pace(), () => Date.now(), ctx !== LIVE);
+    this.frames = new FrameStore(pace());
   }
 
   get recorded(): boolean {

@@ -17,19 +17,12 @@ import type { TraceFilter } from "../api/trace";
 import type { StopResult } from "../api/types";
 import { Channel, contextOf, LIVE } from "./channel";
 import type { TraceView } from "./frames";
+import { paced } from "./pace";
 import { type Beat, LiveSocket, type Urgent } from "./socket";
 import type { Cell, LiveStore } from "./store";
 import { commandBy } from "./urgent";
 
-const HIDDEN_TICK_MS = 250;
-
-/** An animation frame; a hidden page has none, so a slow timer then. */
-function schedule(flush: () => void): void {
-  if (document.hidden) setTimeout(flush, HIDDEN_TICK_MS);
-  else requestAnimationFrame(flush);
-}
-
-export const live = new Channel(LIVE, schedule);
+export const live = new Channel(LIVE, paced);
 
 /** What is known of the bench, whatever the page shows. */
 export const liveStore = live.store;
@@ -57,7 +50,7 @@ export function sendUrgent(urgent: Urgent): Promise<StopResult> {
 
 /** A channel for a recording, or the bench's where none is named. */
 export function useChannel(replay: string | undefined): Channel {
-  return useMemo(() => (replay === undefined ? live : new Channel(contextOf(replay), schedule)), [replay]);
+  return useMemo(() => (replay === undefined ? live : new Channel(contextOf(replay), paced)), [replay]);
 }
 
 /** Hear of a channel while it is called for; the answer ends it. */
