@@ -25,7 +25,7 @@ NODE, ABSENT = 6, 9
 BAUD = 500_000
 LISTEN_S = 0.05
 """Enough on a line on which there is nobody else; a test of those listens longer."""
-DEADLINE_S = 10.0
+DEADLINE_S = 30.0
 
 
 def ip(ind: int, pnu: int) -> Address:
@@ -94,7 +94,7 @@ def wire(baud: int = BAUD, settings: Settings | None = None, *more: Settings) ->
 @asynccontextmanager
 async def connected(config: ProfibusConfig, listen_s: float = LISTEN_S) -> AsyncIterator[ProfibusDriver]:
     driver = ProfibusDriver(config, stamper(), descriptions=(ED2,), listen_s=listen_s)
-    await driver.connect()
+    await driver.connect(DEADLINE_S)
     try:
         yield driver
     finally:

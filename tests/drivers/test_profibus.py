@@ -68,6 +68,8 @@ from tests.drivers.profibus_rig import (
 )
 from tests.drivers.wire import stamper, until
 
+pytestmark = pytest.mark.alone
+"""The twin is heard in the time of its wire: another process on the same cores would hold it up."""
 OTHER, SECOND_NODE = 1, 7
 SETPOINT_VALUE = ip(12, 21)
 FIRST, SECOND = (100).to_bytes(4, "little"), (200).to_bytes(4, "little")
