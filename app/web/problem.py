@@ -17,7 +17,7 @@ from starlette.exceptions import HTTPException
 from app import errors
 from app.errors import HubsideError
 from app.model.texts import LANGUAGES, Texts, error_text, load_texts
-from app.web.models import Problem
+from app.web.models import Failure, Problem
 
 log = logging.getLogger(__name__)
 
@@ -238,3 +238,9 @@ def install(app: FastAPI) -> None:
     async def defect(request: Request, error: Exception) -> JSONResponse:
         log.error("%s %s failed", request.method, request.url.path, exc_info=error)
         return answer(request, HubsideError(reason=type(error).__name__))
+
+
+def failure(address: str, error: HubsideError) -> Failure:
+    """An error as part of a result."""
+    problem = problem_of(error)
+    return Failure(address=address, code=problem.code, text_key=problem.text_key, details=problem.details)

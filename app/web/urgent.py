@@ -17,7 +17,7 @@ from app.service.connection import Connection
 from app.service.journal import Journal
 from app.service.stop import AxisOutcome, Command, Path, command_all
 from app.web.models import AxisDone, Press, StopDone, Urgent
-from app.web.routes.jobs import failure
+from app.web.problem import failure
 
 Commanding = Callable[[], Awaitable[StopDone]]
 Commands = Callable[[Urgent], Commanding | None]

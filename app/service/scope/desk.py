@@ -346,7 +346,8 @@ def _count(head: Head) -> int:
 
 def _concerned(planned: Plan, order: ScopeOrder) -> set[str]:
     """The devices whose values are kept with a capture."""
-    return {one.device for one in planned.signals} | ({order.trigger.device} - {None})  # type: ignore[operator]
+    by_trigger = order.trigger.device
+    return {one.device for one in planned.signals} | (set() if by_trigger is None else {by_trigger})
 
 
 def _addresses(planned: Plan, order: ScopeOrder, connection: Connection) -> dict[str, list[Address]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, Final
 
 from app.model.datatypes import Raw
@@ -118,15 +119,19 @@ def _surroundings(device: Pd4e) -> None:
 def _analogue(device: Pd4e) -> None:
     """Digits as they come (3220h), and (digits + 3321h) / 3322h in 3320h (manual, 3321h and 3322h)."""
     for place in (0, 1):
-        _show(device, 0x3220, place + 1, lambda place=place: device.drive.conditions.analogue[place])  # type: ignore[misc]
-        _show(device, 0x3320, place + 1, lambda place=place: _scaled(device, place))  # type: ignore[misc]
+        _show(device, 0x3220, place + 1, partial(_digits, device, place))
+        _show(device, 0x3320, place + 1, partial(_scaled, device, place))
+
+
+def _digits(device: Pd4e, place: int) -> int:
+    return device.drive.conditions.analogue[place]
 
 
 def _scaled(device: Pd4e, place: int) -> int:
     """OPEN how a quotient is rounded and what a divisor of 0 does: towards 0, and as 1."""
     store = device.store
     offset, divisor = store.number(0x3321, place + 1), store.number(0x3322, place + 1) or 1
-    number = device.drive.conditions.analogue[place] + offset
+    number = _digits(device, place) + offset
     quotient = abs(number) // abs(divisor)
     return quotient if (number < 0) == (divisor < 0) else -quotient
 

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from fastapi import APIRouter
 
-from app.errors import HubsideError
 from app.model.roles import Role
 from app.service.jobs import Job, JobRow
 from app.service.views import raw_to_json
 from app.web.deps import JobsOf, needs
-from app.web.models import Failure, JobDoc, JobRowDoc
-from app.web.problem import NotFoundError, problem_of
+from app.web.models import JobDoc, JobRowDoc
+from app.web.problem import NotFoundError, failure
 
 router = APIRouter()
 
@@ -57,9 +56,3 @@ def _row_doc(row: JobRow) -> JobRowDoc:
         read_raw=None if row.read is None else raw_to_json(row.read),
         error=None if row.error is None else failure(row.address, row.error),
     )
-
-
-def failure(address: str, error: HubsideError) -> Failure:
-    """An error as part of a result."""
-    problem = problem_of(error)
-    return Failure(address=address, code=problem.code, text_key=problem.text_key, details=problem.details)

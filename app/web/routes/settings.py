@@ -69,8 +69,7 @@ from app.web.models.settings import (
     TestRequest,
     TurbineChange,
 )
-from app.web.problem import NotFoundError
-from app.web.routes.jobs import failure
+from app.web.problem import NotFoundError, failure
 
 router = APIRouter(prefix="/settings")
 KINDS = ("adapter_test", "bitrate_search", "adapter_scan", "address_identify")

@@ -16,6 +16,7 @@ from app.service.scope.engine import Cause, Ended
 from app.service.scope.line import latest_of, scope_line, scope_view
 from app.service.scope.tap import PORTION
 from app.store.store import Store
+from app.wire.frame import Can
 from app.wire.nmt import NmtCommand, NmtState
 from app.wire.records import Source, ValueSeen
 from tests.service.conftest import Served
@@ -113,7 +114,7 @@ async def test_what_no_pdo_carries_is_polled_and_says_so(connection: Connection)
 
 
 def _asked(wire: Wire) -> int:
-    return sum(one.payload.can_id & 0x780 == 0x600 for one in wire.frames)  # type: ignore[union-attr]
+    return sum(isinstance(one.payload, Can) and one.payload.can_id & 0x780 == 0x600 for one in wire.frames)
 
 
 async def test_the_state_of_the_axis_triggers(connection: Connection) -> None:

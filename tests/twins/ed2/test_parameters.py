@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -98,7 +99,8 @@ def test_it_refuses_what_is_out_of_range_and_stays(master: Master, entry: Entry)
     assert span is not None
     for raw in (min(values) - 1, max(values) + 1):
         if span[0] <= raw <= span[1]:
-            assert master.refused(lambda raw=raw: master.write(entry.address.short, raw)) is PkwError.OUT_OF_RANGE  # type: ignore[misc]
+            refusal = master.refused(partial(master.write, entry.address.short, raw))
+            assert refusal is PkwError.OUT_OF_RANGE
     assert raw_of(master, entry) == before
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -58,7 +59,7 @@ def test_negative_values_keep_their_sign(master: Master) -> None:
         (lambda m: m.do(pkw.read(where("0/51"))), PkwError.OTHER),
     ],
 )
-def test_every_refusal_has_its_code(master: Master, action, code: PkwError) -> None:  # type: ignore[no-untyped-def]
+def test_every_refusal_has_its_code(master: Master, action: Callable[[Master], pkw.PkwAnswer], code: PkwError) -> None:
     answer = action(master)
     assert answer.kind is ReplyKind.REFUSED
     assert answer.value == code
