@@ -14,7 +14,7 @@ from app.wire.profibus.pzd import ORDERS, First, Order, orders_that_fit
 from app.wire.profibus.telegrams import Part, Signal, TelegramType
 
 CONTRADICTIONS: Final = 3
-"""So many readings in a row that fit none of the orders left, and the proof begins anew: it is another device now."""
+"""So many readings in a row that fit another order than those left, and the proof begins anew: another device is there."""
 
 
 class OrderProof:
@@ -59,10 +59,11 @@ class OrderProof:
         if left:
             self._left, self._against = left, 0
             return
-        # A value that changed between the reading and the telegram fits no order, and is no proof of another one.
+        if not fits:
+            return  # the value has changed since it was read: that says nothing, as often as it comes
         self._against += 1
         if self._against >= CONTRADICTIONS:
-            self._left, self._against = fits or ORDERS, 0
+            self._left, self._against = fits, 0
 
     def snapshot(self) -> dict[str, Any]:
         """JSON-able. The setting is not in it."""

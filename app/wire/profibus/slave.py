@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 
 from app.model.description import Bus, Description
+from app.wire.fault_watch import DSP408, FaultWatch
 from app.wire.frame import Direction
 from app.wire.profibus import pkw
 from app.wire.profibus.order_proof import OrderProof
@@ -14,6 +15,7 @@ from app.wire.profibus.pkw_follower import Ended, PkwFollower
 from app.wire.profibus.pzd import Order, decode_pzd
 from app.wire.profibus.telegrams import Signal, TelegramType, Words, telegram_of
 from app.wire.records import (
+    FaultSeen,
     Outcome,
     Protocol,
     Record,
@@ -47,6 +49,7 @@ class Slave:
         """What it answered then."""
         self._missed = 0
         self._pkw = PkwFollower()
+        self._faults = FaultWatch(DSP408)
 
     @property
     def order(self) -> Order | None:
@@ -80,14 +83,23 @@ class Slave:
         if telegram is None:
             return []
         if not telegram.has_pkw:
-            return self._process_data(t_ns, telegram, outputs, inputs)
+            told = self._process_data(t_ns, telegram, outputs, inputs)
+            return [*told, *self._faults_of(told)]
         ends = self._pkw.exchange(t_ns, outputs[: pkw.SIZE], inputs[: pkw.SIZE], client, base)
         for ended in ends:
             self._prove(telegram, ended, inputs)
         records = self._process_data(t_ns, telegram, outputs, inputs)
         for ended in ends:
             records += self._told(t_ns, ended)
-        return records
+        return [*records, *self._faults_of(records)]
+
+    def _faults_of(self, records: Sequence[Record]) -> Iterator[FaultSeen]:
+        """What the values that it gave tell of a fault, where that is new."""
+        for record in records:
+            if isinstance(record, ValueSeen) and record.source in (Source.SDO_READ, Source.PDO_TX):
+                fault = self._faults.see(record)
+                if fault is not None:
+                    yield fault
 
     def _prove(self, telegram: TelegramType, ended: Ended, inputs: bytes) -> None:
         """What was read stands in the process data of the same telegram too, where they have it."""
@@ -97,6 +109,7 @@ class Slave:
 
     def forget(self, t_ns: int) -> list[Record]:
         """It is gone, or frames are missing: what is open will not be answered."""
+        self._faults.forget()
         return [record for ended in self._pkw.forget() for record in self._told(t_ns, ended)]
 
     def _become(self, t_ns: int, state: SlaveState | None) -> list[Record]:
@@ -160,6 +173,7 @@ class Slave:
             "inputs": self.inputs.hex(),
             "missed": self._missed,
             "pkw": self._pkw.snapshot(),
+            "faults": self._faults.snapshot(),
         }
 
     def restore(self, kept: Mapping[str, Any]) -> None:
@@ -169,3 +183,4 @@ class Slave:
         self.outputs, self.inputs = bytes.fromhex(kept["outputs"]), bytes.fromhex(kept["inputs"])
         self._missed = kept["missed"]
         self._pkw.restore(kept["pkw"])
+        self._faults.restore(kept["faults"])
