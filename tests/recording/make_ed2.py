@@ -40,7 +40,7 @@ LIBRARY: Final = "0.1.0"
 RAMP: Final = 50_000
 _HOLD, _RUN, _START, _RESET = 0x3, 0x7, 0x2000, 0x8
 _REACHED: Final = 0x1000
-_EVERY_MS: Final = 10
+_EVERY_MS: Final = 4
 """Of the exchange of data while nothing else is asked."""
 
 
@@ -125,6 +125,15 @@ def until(master: Master, holds: Callable[[], bool], most_ms: int = 10_000) -> N
     raise AssertionError(f"the device did not come there: {master.status:04X}h")
 
 
+def move(master: Master, to: int) -> None:
+    """To a position, and a while there."""
+    master.set(_RUN, to)
+    rest(master, 200)
+    master.set(_RUN | _START)
+    until(master, lambda: bool(master.status & _REACHED))
+    rest(master, 1_000)
+
+
 def begin(master: Master) -> None:
     """From the first question to the exchange of data, as every master does it."""
     master.send(dp.FdlStatus())
@@ -151,11 +160,7 @@ def play(wire: RecordedWire) -> None:
     master.write("12/61", RAMP)
     master.refused(lambda: master.write("0/38", 1))
     rest(master, 300)
-    master.set(_RUN, 300_000)
-    rest(master, 200)
-    master.set(_RUN | _START)
-    until(master, lambda: bool(master.status & _REACHED))
-    rest(master, 500)
+    move(master, 300_000)
     wire.fault("sensor_wire,axis=1,for_s=0.5")
     until(master, lambda: bool(master.seen[0].get(ERROR_CODE)))
     wire.note(text="sensor plug pressed home", device=SLUG, person="bench")
@@ -168,6 +173,7 @@ def play(wire: RecordedWire) -> None:
     rest(master, 300)
     restart(wire, master)
     parameters(master)
+    move(master, 250_000)
     leave(master)
     rest_of_time(wire)
 

@@ -14,7 +14,7 @@ from app.wire.profibus.pzd import ORDERS, First, Order, orders_that_fit
 from app.wire.profibus.telegrams import Part, Signal, TelegramType
 
 CONTRADICTIONS: Final = 3
-"""So many readings in a row that fit another order than those left, and the proof begins anew: another device is there."""
+"""So many readings in a row that fit another order, and the proof begins anew: it is another device now."""
 
 
 class OrderProof:
