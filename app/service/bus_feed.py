@@ -59,6 +59,11 @@ class BusFeed:
         self._live = live
         self._lock = lock
 
+    @property
+    def is_managed(self) -> bool:
+        """True where its nodes have states, heartbeats and boot-up messages: CAN."""
+        return self._can is not None
+
     def describe(self, node: int, description: Description) -> None:
         """Tell decoder and live state what stands at ``node``."""
         with self._lock:

@@ -176,7 +176,7 @@ def node_lines(targets: Iterable[Target], live: LiveState) -> tuple[NodeLine, ..
 
 def is_managed(target: Target) -> bool:
     """True where its bus has network management: states, heartbeats, boot-up messages."""
-    return target.description.bus is not Bus.MODBUS_TCP
+    return target.description.bus is Bus.CANOPEN
 
 
 def _node_line(target: Target, view: NodeView | None) -> NodeLine:

@@ -457,6 +457,8 @@ class LiveState:
         node = self._node(seen.bus, seen.node)
         self._see(node)
         node.silent = seen.state is SlaveState.ABSENT
+        if not node.silent:
+            node.answered_ns = seen.t_ns
         self._touch_node(node)
         self._add_event(seen.t_ns, seen.bus, seen.node, tell_slave(seen))
 

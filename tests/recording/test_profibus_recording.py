@@ -1,4 +1,4 @@
-"""Recordings of PROFIBUS: every telegram reads back, copies keep it, and what is told of them is what the decoder sees."""
+"""Recordings of PROFIBUS: telegrams read back, copies keep them, and all that is told is what the decoder sees."""
 
 from __future__ import annotations
 

@@ -100,13 +100,8 @@ def test_a_job_is_told_where_it_is_new_and_where_it_ends() -> None:
         [*exchanged(line), *exchanged(line, write), *exchanged(line, write, taken), *exchanged(line, write, taken)]
     )
     told = [(row.address, row.value) for row in rows]
-    assert (
-        told
-        == [(None, None)] * 2
-        + [(SPEED, b"\x64\0\0\0"), (None, None)]
-        + [(None, None), (SPEED, b"\x64\0\0\0")]
-        + [(None, None)] * 2
-    )
+    nothing, named = (None, None), (SPEED, b"\x64\0\0\0")
+    assert told == [nothing, nothing, named, nothing, nothing, named, nothing, nothing]
     assert [row.speaker.service for row in rows[-2:]] == [Service.FDL_SAME, Service.FDL_SAME]
 
 

@@ -10,7 +10,6 @@ from app.model.address import Address
 from app.service.bus_feed import BusFeed
 from app.service.stage import Stage
 from app.service.trace.text import Namer, TraceItem, abort_details, emcy_details
-from app.service.views import is_managed
 from app.wire.busload import EXTENDED_KEY
 from app.wire.emcy import NO_ERROR
 from app.wire.frame import Can, Direction
@@ -181,7 +180,7 @@ def _node(
         sdo_count=link.trace.sdo_count.get(node, 0),
         sdo_t_ns=None if last is None else last.t_ns,
         other_client_t_ns=known.other_client_ns,
-        managed=target is None or is_managed(target),
+        managed=link.is_managed,
         answered_t_ns=known.answered_ns,
     )
 

@@ -10399,6 +10399,26 @@ export interface components {
             start_t_ns: number;
         };
         /**
+         * TraceFdl
+         * @description Of a PROFIBUS telegram: who speaks to whom, and the access points; None where it does not say.
+         *
+         *     ``pkw``: its data begin with PKW, the process data follow. ``sound``: it is a whole telegram without an error.
+         */
+        TraceFdl: {
+            /** Destination */
+            destination: number | null;
+            /** Dsap */
+            dsap: number | null;
+            /** Pkw */
+            pkw: boolean;
+            /** Sound */
+            sound: boolean;
+            /** Source */
+            source: number | null;
+            /** Ssap */
+            ssap: number | null;
+        };
+        /**
          * TraceFilter
          * @description Empty means any; all that is given must hold. ``id`` comes back with each answer.
          *
@@ -10490,7 +10510,8 @@ export interface components {
          * @description One frame, or a gap in the traffic. ``start_t_ns``: the first request of the transfer that this frame ended.
          *
          *     Of Modbus TCP ``transaction`` is set, ``peer`` is the client's end of the connection, ``number`` the function
-         *     code and ``dlc`` the bytes of the ADU; ``can_id`` is 0.
+         *     code and ``dlc`` the bytes of the ADU; ``can_id`` is 0. Of PROFIBUS ``fdl`` is set, and ``dlc`` is the bytes of the
+         *     telegram.
          */
         TraceLine: {
             /** Bus */
@@ -10510,6 +10531,7 @@ export interface components {
             dlc: number;
             /** Extended */
             extended: boolean;
+            fdl: components["schemas"]["TraceFdl"] | null;
             /** Items */
             items: components["schemas"]["TraceItem"][];
             /** Node */

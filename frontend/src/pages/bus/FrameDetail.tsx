@@ -12,13 +12,16 @@ import {
   exactTime,
   HEADER_BYTES,
   idText,
+  isCan,
   noteTexts,
   objectName,
   partnerOf,
   serviceText,
   shownBytes,
+  station,
   valueText,
 } from "./lines";
+import { partsOf } from "./fdlParts";
 
 interface Props {
   line: TraceLine;
@@ -41,7 +44,7 @@ export function FrameDetail({ line, rows, onPick }: Props) {
       <header>
         <strong>
           {idText(line)}
-          {line.transaction === null && "h"} · {serviceText(line, t)}
+          {isCan(line) && "h"} · {serviceText(line, t)}
           {line.device !== null && ` · ${nameOf(line.device)}`}
         </strong>
         <Narrow line={line} />
@@ -56,7 +59,7 @@ export function FrameDetail({ line, rows, onPick }: Props) {
           <span title={`${BigInt(line.t_ns).toString()} ns`}>{exactTime(line.t_ns)}</span>
         </Fact>
         {previous && <Fact name="since_previous">{ms(line.t_ns - previous.t_ns)} ms</Fact>}
-        {line.transaction === null ? <CanFacts line={line} /> : <AduFacts line={line} />}
+        <Facts line={line} />
         {line.step !== null && <Fact name="step">{t(`trace.step.${line.step}`)}</Fact>}
         {line.items.map((item, at) => (
           <Fact key={`${item.address}-${String(at)}`} name="object">
@@ -76,6 +79,11 @@ export function FrameDetail({ line, rows, onPick }: Props) {
       </dl>
     </section>
   );
+}
+
+function Facts({ line }: { line: TraceLine }) {
+  if (line.fdl) return <FdlFacts line={line} fdl={line.fdl} />;
+  return line.transaction === null ? <CanFacts line={line} /> : <AduFacts line={line} />;
 }
 
 function CanFacts({ line }: { line: TraceLine }) {
@@ -114,6 +122,35 @@ function AduFacts({ line }: { line: TraceLine }) {
         <b className={classes.bytes}>{shownBytes(line).join(" ")}</b>
         <span className="dim"> {t("trace.detail.adu_bytes", { count: line.dlc })}</span>
       </Fact>
+    </>
+  );
+}
+
+/** Of a telegram of PROFIBUS: its ends, its access points, and its bytes part by part. */
+function FdlFacts({ line, fdl }: { line: TraceLine; fdl: NonNullable<TraceLine["fdl"]> }) {
+  const t = useTexts();
+  const known = fdl.source !== null && fdl.destination !== null;
+  const ends = { source: station(fdl.source), destination: station(fdl.destination) };
+  const saps = { dsap: station(fdl.dsap), ssap: station(fdl.ssap) };
+  return (
+    <>
+      <Fact name="telegram">
+        {t(known ? "trace.detail.ends" : "trace.detail.ends_unknown", ends)}
+        {(fdl.dsap !== null || fdl.ssap !== null) && ` · ${t("trace.detail.saps", saps)}`} · {line.bus} ·{" "}
+        {t(`trace.detail.direction_${line.direction}`)}
+      </Fact>
+      <div className={classes.wide}>
+        <dt>{t("trace.detail.bytes")}</dt>
+        <dd className={classes.parts} data-testid="fdl-parts">
+          {partsOf(line).map((part, at) => (
+            <span key={`${part.name}-${String(at)}`} className={classes.part} data-kind={part.kind}>
+              <small>{part.kind === "head" ? part.name : t(`trace.detail.part_${part.name}`)}</small>
+              <b className={classes.bytes}>{part.bytes.join(" ")}</b>
+            </span>
+          ))}
+          <span className="dim">{t("trace.detail.fdl_bytes", { count: line.dlc })}</span>
+        </dd>
+      </div>
     </>
   );
 }
@@ -159,7 +196,7 @@ function Narrow({ line }: { line: TraceLine }) {
   const address = line.items[0]?.address;
   return (
     <span className={classes.narrow}>
-      {line.transaction === null && (
+      {isCan(line) && (
         <Button px="sm" variant="default" onClick={() => update({ ids: idText(line) })}>
           {t("trace.detail.only_id")}
         </Button>

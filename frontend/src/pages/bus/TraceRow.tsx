@@ -63,6 +63,9 @@ export const TraceRow = memo(function TraceRow({ line, top, index, picked, query
   );
 });
 
+/** One frame with many objects: then the names of all have no room. */
+const isCarrying = (line: TraceLine): boolean => line.service === "modbus-response" || line.fdl !== null;
+
 function Meaning({ line, query, t }: { line: TraceLine; query: string; t: Translate }) {
   const Sign = line.tone === "error" ? IconAlertOctagon : line.tone === "warning" ? IconAlertTriangle : null;
   return (
@@ -73,7 +76,7 @@ function Meaning({ line, query, t }: { line: TraceLine; query: string; t: Transl
         <Item
           key={`${item.address}-${String(at)}`}
           item={item}
-          named={line.service !== "modbus-response" || line.items.length <= NAMED_ITEMS}
+          named={isCarrying(line) ? line.items.length <= NAMED_ITEMS : true}
           query={query}
           t={t}
         />

@@ -11,6 +11,8 @@ export const GROUPS: Record<string, readonly string[]> = {
   emcy: ["emcy"],
   sync: ["sync", "time"],
   modbus: ["modbus-request", "modbus-response"],
+  profibus: ["fdl-request", "fdl-response"],
+  cyclic: ["fdl-same", "fdl-token"],
   other: ["lss", "error", "twin", "unknown"],
 };
 

@@ -8,6 +8,7 @@ import {
   bytesOf,
   exactTime,
   idText,
+  isCan,
   meaningText,
   partnerOf,
   serviceText,
@@ -55,8 +56,28 @@ const line = (parts: Partial<TraceLine>): TraceLine =>
     start_t_ns: null,
     transaction: null,
     peer: null,
+    fdl: null,
     ...parts,
   }) as TraceLine;
+
+describe("a row of PROFIBUS", () => {
+  const fdl = { source: 2, destination: 6, dsap: null, ssap: null, pkw: true, sound: true };
+  const telegram = line({ service: "fdl-same", number: 0, fdl, data: "e5" });
+
+  it("names its ends and its service", () => {
+    expect(idText(telegram)).toBe("2→6");
+    expect(idText(line({ fdl: { ...fdl, source: null, destination: null } }))).toBe("–→–");
+    expect(serviceText(telegram, en)).toBe("DP unchanged");
+    expect(serviceText(telegram, de)).toBe("DP unverändert");
+    expect(shownBytes(telegram)).toEqual(["E5"]);
+    expect([isCan(telegram), isCan(line({}))]).toEqual([false, true]);
+  });
+
+  it("is in the filter with and without what brings nothing new", () => {
+    expect(filterOf({ services: "profibus" }).services).toEqual(["fdl-request", "fdl-response"]);
+    expect(GROUPS.cyclic).toContain("fdl-same");
+  });
+});
 
 describe("a row of Modbus TCP", () => {
   const adu = line({ service: "modbus-response", number: 43, transaction: 17, data: "001100000003002b0d00" });

@@ -6,16 +6,23 @@ import { timeOfDay } from "../../ui/format";
 
 const NUMBER = /^-?\d+\.\d+$/;
 
-type Identified = Pick<TraceLine, "can_id" | "extended"> & Partial<Pick<TraceLine, "transaction">>;
+type Identified = Pick<TraceLine, "can_id" | "extended"> & Partial<Pick<TraceLine, "transaction" | "fdl">>;
 
-/** The identifier in hexadecimal; of an ADU the number of its transaction. */
-export const idText = (line: Identified): string =>
-  typeof line.transaction === "number"
-    ? `#${String(line.transaction)}`
-    : line.can_id
-        .toString(16)
-        .toUpperCase()
-        .padStart(line.extended ? 8 : 3, "0");
+/** The identifier in hexadecimal; of an ADU the number of its transaction; of a telegram its addresses. */
+export function idText(line: Identified): string {
+  if (typeof line.transaction === "number") return `#${String(line.transaction)}`;
+  if (line.fdl) return `${station(line.fdl.source)}→${station(line.fdl.destination)}`;
+  return line.can_id
+    .toString(16)
+    .toUpperCase()
+    .padStart(line.extended ? 8 : 3, "0");
+}
+
+export const station = (address: number | null): string => (address === null ? "–" : String(address));
+
+/** Neither an ADU of Modbus TCP nor a telegram of PROFIBUS. */
+export const isCan = (line: Pick<TraceLine, "transaction" | "fdl">): boolean =>
+  line.transaction === null && line.fdl === null;
 
 export const bytesOf = (hex: string): string[] => hex.toUpperCase().match(/../g) ?? [];
 
