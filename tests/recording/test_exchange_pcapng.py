@@ -1,7 +1,8 @@
-"""ADUs exported as pcapng: tshark dissects them as what they are, with nothing told to it, and finds nothing wrong."""
+"""Telegrams exported as pcapng: tshark dissects ADUs as what they are, and gives those of PROFIBUS byte by byte."""
 
 from __future__ import annotations
 
+import json
 import shutil
 import subprocess
 from ipaddress import IPv4Address
@@ -10,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from app.errors import UsageError
-from app.recording.exchange.exporting import Choice, adu_buses, can_buses, export, losses
+from app.recording.exchange.exporting import Choice, can_buses, export, losses, telegram_buses
 from app.recording.exchange.formats import Format, Head, Lost, detect
 from app.recording.exchange.importing import ImportOrder, import_file
 from app.recording.exchange.pcapng import write_pcapng
@@ -20,6 +21,7 @@ from app.wire.modbus.adu import decode_adu
 from tests.recording.make_pd4e import BUS, MASTER, SAMPLE, SERVER
 from tests.recording.rig import frames_of
 
+LINE = SAMPLE.with_name("ed2-bench.mcap")
 OAT = SAMPLE.with_name("7-service-visit.mcap")
 FIELDS = (
     "frame.time_epoch",
@@ -53,7 +55,7 @@ def dissected(path: Path) -> list[dict[str, str]]:
 def test_wireshark_reads_every_adu_as_modbus_tcp(tmp_path: Path) -> None:
     path = tmp_path / "bench.pcapng"
     with open_recording(SAMPLE) as recording:
-        assert (adu_buses(recording), can_buses(recording)) == ((BUS,), ())
+        assert (telegram_buses(recording), can_buses(recording)) == ((BUS,), ())
         told = losses(recording, Choice(Format.PCAPNG))
         done = export(recording, path, Choice(Format.PCAPNG))
     assert not {loss.what for loss in told} & {Lost.FRAME, Lost.TIME, Lost.BUS, Lost.DIRECTION}
@@ -76,6 +78,34 @@ def test_wireshark_reads_every_adu_as_modbus_tcp(tmp_path: Path) -> None:
         assert (row["ip.checksum.status"], row["tcp.checksum.status"]) == (GOOD, GOOD)
 
 
+def packets(path: Path) -> list[tuple[int, str, int, bytes]]:
+    """Time in ns, interface, direction and bytes of each packet, as tshark reads them."""
+    command = ["tshark", "-r", path.name, "-T", "json", "-x"]
+    done = subprocess.run(command, cwd=path.parent, check=True, timeout=100, capture_output=True, text=True)
+    found = []
+    for packet in json.loads(done.stdout):
+        layers = packet["_source"]["layers"]
+        told = layers["frame"]
+        seconds, _, fraction = told["frame.time_epoch"].partition(".")
+        way = int(told["frame.packet_flags_tree"]["frame.packet_flags_direction"], 0)
+        name, data = told["frame.interface_id_tree"]["frame.interface_name"], bytes.fromhex(layers["frame_raw"][0])
+        found.append((int(seconds) * 10**9 + int(fraction), name, way, data))
+    return found
+
+
+def test_wireshark_reads_the_bytes_of_every_telegram_of_profibus(tmp_path: Path) -> None:
+    path = tmp_path / "line.pcapng"
+    with open_recording(LINE) as recording:
+        assert (telegram_buses(recording), can_buses(recording)) == (("dp0",), ())
+        told = losses(recording, Choice(Format.PCAPNG))
+        done = export(recording, path, Choice(Format.PCAPNG))
+    assert not {loss.what for loss in told} & {Lost.FRAME, Lost.TIME, Lost.BUS, Lost.DIRECTION}
+    frames = frames_of(LINE)
+    assert done.frames == len(frames)
+    sent = {Direction.TX: 2, Direction.RX: 1}
+    assert packets(path) == [(one.t_ns, one.bus, sent[one.direction], one.payload.data) for one in frames]
+
+
 def test_an_end_without_an_ipv4_address_gets_one_that_the_file_tells(tmp_path: Path) -> None:
     path = tmp_path / "names.pcapng"
     adu = bytes.fromhex("000100000006 00 03 1388 0001")
@@ -93,6 +123,7 @@ def test_an_end_without_an_ipv4_address_gets_one_that_the_file_tells(tmp_path: P
 def test_what_does_not_fit_a_format_is_refused_with_what_does(tmp_path: Path) -> None:
     for source, refused, better in (
         (SAMPLE, [Format.CANDUMP, Format.BLF, Format.CSV], "pcapng"),
+        (LINE, [Format.CANDUMP, Format.TRC, Format.ASC], "pcapng"),
         (OAT, [Format.PCAPNG], "candump"),
     ):
         with open_recording(source) as recording:

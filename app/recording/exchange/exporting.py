@@ -1,6 +1,6 @@
 """Writes the frames of a recording in a format of others, and tells before what that format cannot hold.
 
-pcapng takes ADUs of Modbus TCP, all others take CAN frames.
+pcapng takes ADUs of Modbus TCP and telegrams of PROFIBUS, all others take CAN frames.
 """
 
 from __future__ import annotations
@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from app.errors import RecordingError, UsageError
-from app.recording.content import METADATA_BIT_RATES, METADATA_SERVERS
+from app.model.description import Bus
+from app.recording.content import METADATA_BIT_RATES
 from app.recording.exchange.asc import asc_lines
 from app.recording.exchange.blf import write_blf
 from app.recording.exchange.candump import candump_lines
@@ -21,13 +22,15 @@ from app.recording.exchange.draft import drafted
 from app.recording.exchange.formats import Format, Head, Loss, Lost, Style, held, lost_parts
 from app.recording.exchange.pcapng import write_pcapng
 from app.recording.exchange.trc import trc_lines
-from app.recording.node_table import read_servers
 from app.recording.reader import Recording
 from app.recording.schemas import CAN_FRAME, CLOCK_TOPIC, EVENTS_TOPIC, STATE_TOPIC, TELEGRAM, MessageType
 from app.wire.frame import Frame
 
 _TOLD_EVERY: Final = 10_000
-_HOLDS: Final = {False: ("ADUs of Modbus TCP", "pcapng"), True: ("CAN frames", "candump, asc, blf, trc or csv")}
+_HOLDS: Final = {
+    False: ("telegrams of Modbus TCP and PROFIBUS", "pcapng"),
+    True: ("CAN frames", "candump, asc, blf, trc or csv"),
+}
 """What a format cannot hold, and which one can; True: of pcapng."""
 _LINES: Final[dict[Format, Callable[[Head, Iterable[Frame], Style], Iterator[str]]]] = {
     Format.CANDUMP: candump_lines,
@@ -82,10 +85,15 @@ def can_buses(recording: Recording) -> tuple[str, ...]:
     return _buses_of(recording, CAN_FRAME)
 
 
-def adu_buses(recording: Recording) -> tuple[str, ...]:
-    """The buses of Modbus TCP of which there are messages."""
-    with_servers = {bus for bus, _ in read_servers(recording.metadata.get(METADATA_SERVERS, {}))}
-    return tuple(bus for bus in _buses_of(recording, TELEGRAM) if bus in with_servers)
+def telegram_buses(recording: Recording) -> tuple[str, ...]:
+    """The buses of Modbus TCP and the PROFIBUS lines of which there are messages."""
+    with_servers = {bus for bus, _ in recording.servers}
+    return tuple(bus for bus in _buses_of(recording, TELEGRAM) if bus in with_servers or bus in _lines(recording))
+
+
+def _lines(recording: Recording) -> set[str]:
+    """Those that are PROFIBUS."""
+    return {bus for bus, kind in recording.kinds.items() if kind is Bus.PROFIBUS_DP}
 
 
 def _buses_of(recording: Recording, message: MessageType) -> tuple[str, ...]:
@@ -120,7 +128,7 @@ def export(
 
 
 def _buses(recording: Recording, choice: Choice) -> tuple[str, ...]:
-    there, others = can_buses(recording), adu_buses(recording)
+    there, others = can_buses(recording), telegram_buses(recording)
     if choice.into is Format.PCAPNG:
         there, others = others, there
     if others and not there:
@@ -148,7 +156,7 @@ def _write(
     counter = _Counter(on_frames)
     frames = counter(chosen_frames(recording, choice), choice)
     if choice.into is Format.PCAPNG:
-        write_pcapng(path, head, frames)
+        write_pcapng(path, head, frames, _lines(recording))
     elif choice.into is Format.BLF:
         write_blf(path, head, frames)
     else:

@@ -16,7 +16,7 @@ from typing import Final, NamedTuple
 from app.errors import UsageError
 from app.recording.cdr import MAX_DATA, MAX_T_NS, make_can
 from app.recording.summary import MAGIC
-from app.wire.frame import Adu, Can, Direction, Frame
+from app.wire.frame import Adu, Can, Direction, Fdl, Frame
 
 US: Final = 1_000
 MAX_STANDARD_ID: Final = 0x7FF
@@ -61,7 +61,7 @@ SUFFIXES: Final = {
 
 
 IMPORTED: Final = tuple(one for one in Format if one is not Format.PCAPNG)
-"""What is read, too. Of segments on a network ADUs would have to be put together first: pcapng is written only."""
+"""What is read, too. ADUs would have to be put together of segments on a network first: pcapng is written only."""
 
 
 class Lost(Enum):
@@ -167,7 +167,7 @@ def held(frame: Frame, into: Format, style: Style = Style.COMMON) -> Frame | Non
     if into is Format.MCAP:
         return frame._replace(t_adapter_ns=None)
     if into is Format.PCAPNG:
-        return frame._replace(t_adapter_ns=None) if isinstance(can, Adu) else None
+        return frame._replace(t_adapter_ns=None) if isinstance(can, Adu | Fdl) else None
     if not isinstance(can, Can):
         return None
     exact = style is Style.EXACT

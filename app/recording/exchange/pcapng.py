@@ -1,9 +1,12 @@
-"""pcapng (draft-ietf-opsawg-pcapng), as Wireshark and tshark read it: ADUs of Modbus TCP in frames of Ethernet.
+"""pcapng (draft-ietf-opsawg-pcapng), as Wireshark and tshark read it: ADUs in frames of Ethernet, PROFIBUS as it is.
 
-A recording holds ADUs and no segments, so that everything around them is made up: addresses of Ethernet out of those of
-IP, sequence numbers that go on without a gap, one segment for each ADU, no beginning and no end of a connection. Ports
-and IPv4 addresses are those that were seen; an end with another name gets one of 192.0.2.0/24 (RFC 5737), and the
-comment of the file tells which.
+A recording holds ADUs of Modbus TCP and no segments, so that everything around them is made up: addresses of Ethernet
+out of those of IP, sequence numbers that go on without a gap, one segment for each ADU, no beginning and no end of a
+connection. Ports and IPv4 addresses are those that were seen; an end with another name gets one of 192.0.2.0/24
+(RFC 5737), and the comment of the file tells which.
+
+Telegrams of PROFIBUS have a link type of their own, so that nothing is made up around them. Wireshark 4 has no words
+for that type: it shows their times and bytes, and a dissector of others may take them.
 
 Each bus is an interface. Times are whole ns; the direction stands in the flags of a packet.
 """
@@ -11,16 +14,18 @@ Each bus is an interface. Times are whole ns; the direction stands in the flags 
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from ipaddress import AddressValueError, IPv4Address
 from pathlib import Path
 from typing import BinaryIO, Final, NamedTuple
 
 from app.recording.exchange.formats import Head
-from app.wire.frame import Adu, Direction, Frame
+from app.wire.frame import Adu, Direction, Fdl, Frame
 from app.wire.modbus.transactions import ARROW
 
 _ETHERNET: Final = 1
+_PROFIBUS_DL: Final = 257
+"""LINKTYPE_PROFIBUS_DL: telegrams from start to end delimiter (tcpdump.org/linktypes)."""
 _IPV4: Final = 0x0800
 _TCP: Final = 6
 _PUSH_ACK: Final = 0x18
@@ -98,14 +103,17 @@ class Framing:
         return int(IPv4Address(self.stand_ins[host]))
 
 
-def write_pcapng(path: Path, head: Head, frames: Iterable[Frame]) -> None:
-    """Writes ``path``, which must not exist. The comment with the stand-ins comes at the end. Raises OSError."""
+def write_pcapng(path: Path, head: Head, frames: Iterable[Frame], lines: Collection[str] = ()) -> None:
+    """Writes ``path``, which must not exist. The comment with the stand-ins comes at the end. Raises OSError.
+
+    ``lines`` are those of the buses that are PROFIBUS.
+    """
     framing = Framing()
     interfaces = {bus: number for number, bus in enumerate(head.buses)}
     with path.open("xb") as file:
         file.write(_section())
         for bus in head.buses:
-            file.write(_interface(bus))
+            file.write(_interface(bus, _PROFIBUS_DL if bus in lines else _ETHERNET))
         last_ns = _write_packets(file, framing, interfaces, frames)
         if framing.stand_ins and head.buses:
             told = ", ".join(f"{address} stands for {host or '?'}" for host, address in framing.stand_ins.items())
@@ -117,9 +125,13 @@ def _write_packets(file: BinaryIO, framing: Framing, interfaces: Mapping[str, in
     for frame in frames:
         if isinstance(frame.payload, Adu):
             data = framing.frame(frame.payload, frame.direction)
-            flags = _OUTBOUND if frame.direction is Direction.TX else _INBOUND
-            file.write(_packet_block(interfaces[frame.bus], frame.t_ns, data, flags))
-            last_ns = frame.t_ns
+        elif isinstance(frame.payload, Fdl):
+            data = frame.payload.data
+        else:
+            continue
+        flags = _OUTBOUND if frame.direction is Direction.TX else _INBOUND
+        file.write(_packet_block(interfaces[frame.bus], frame.t_ns, data, flags))
+        last_ns = frame.t_ns
     return last_ns
 
 
@@ -171,9 +183,9 @@ def _section() -> bytes:
     return _block(_SECTION, struct.pack("<IHHq", _BYTE_ORDER, 1, 0, -1) + _options([(4, b"Hubside")]))
 
 
-def _interface(bus: str) -> bytes:
+def _interface(bus: str, link_type: int) -> bytes:
     options = [(2, bus.encode()), (9, bytes((_NANOSECONDS,)))]
-    return _block(_INTERFACE, struct.pack("<HHI", _ETHERNET, 0, 0) + _options(options))
+    return _block(_INTERFACE, struct.pack("<HHI", link_type, 0, 0) + _options(options))
 
 
 def _packet_block(interface: int, t_ns: int, data: bytes, flags: int, comment: str = "") -> bytes:
