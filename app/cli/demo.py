@@ -30,7 +30,15 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser.add_argument("--turnaround-ms", type=milliseconds, default=1.0, help="time a twin takes to answer")
     add_port(parser)
     parser.set_defaults(
-        run=run, consent=False, listen_s=0.5, eds=[], turbine=None, can=None, modbus=None, no_record=False
+        run=run,
+        consent=False,
+        listen_s=0.5,
+        eds=[],
+        turbine=None,
+        can=None,
+        modbus=None,
+        profibus=None,
+        no_record=False,
     )
     parser.set_defaults(listen=None, tls_cert=None, tls_key=None, host=[])
 
