@@ -17,7 +17,7 @@ import {
   useSyncExternalStore,
 } from "react";
 import type { TraceFilter } from "../api/trace";
-import type { AxisData, StopResult } from "../api/types";
+import type { AxisData, LinkData, Mode, MotionData, StopResult } from "../api/types";
 import { alike, Kept } from "./alike";
 import { mayMove } from "./axis";
 import { Channel, contextOf, LIVE } from "./channel";
@@ -88,12 +88,18 @@ interface Watching<T> {
  * What is worked out of the store, looked at whenever one of the topics changes, and shown anew only where it has become
  * another one. In no hurry: a key that is pressed meanwhile comes first, in the midst of many values too.
  */
-export function useDerived<T>(
+export const useDerived = <T>(
+  topics: readonly string[],
+  read: (store: LiveStore) => T,
+  watching?: Watching<T>,
+): T => useDerivedOf(useShown(), topics, read, watching);
+
+function useDerivedOf<T>(
+  shown: Channel,
   topics: readonly string[],
   read: (store: LiveStore) => T,
   { everyMs, same = alike }: Watching<T> = {},
 ): T {
-  const shown = useShown();
   const [, renew] = useReducer((count: number) => count + 1, 0);
   const [kept] = useState(() => new Kept<T>());
   const look = useEffectEvent(() => {
@@ -126,16 +132,26 @@ function asTimeGoes({ store, recorded }: Channel, everyMs: number, look: () => v
 
 /** Whether the page hears the bench: one socket brings everything. */
 export const useHearing = () => useTopicOf(liveStore, "hearing", (store) => store.hearing);
+/** What the bench is, "none" while it is not connected. */
+export const useLiveMode = (): Mode =>
+  useTopicOf(liveStore, "link", ({ link }) => (link?.state === "connected" ? link.mode : "none"));
 export const useLiveLink = () => useTopicOf(liveStore, "link", (store) => store.link);
 export const useLiveInstructor = () => useTopicOf(liveStore, "instructor", (store) => store.instructor);
 /** Whether any axis of the bench may move. In a hurry, as it says what Esc is. */
 export const useMayMove = () => useTopicOf(liveStore, "axes", (store) => mayMove(store.axes.values()));
 /** Who may move the axes; always of the bench. */
-export const useMotion = () => useTopicOf(liveStore, "motion", (store) => store.motion);
+export const useMotion = () => useDerivedOf(live, ["motion"], (store) => store.motion);
+/** One mark of it, in a hurry. */
+export const useMotionMark = <T extends string | number | boolean | null>(
+  pick: (motion: MotionData | null) => T,
+): T => useTopicOf(liveStore, "motion", (store) => pick(store.motion));
 export const useLiveBench = () => useTopicOf(liveStore, "bench", (store) => store.bench);
 
 export const useBench = () => useTopic("bench", (store) => store.bench);
 export const useLink = () => useTopic("link", (store) => store.link);
+/** What is worked out of the link; its figures change every second. */
+export const useOfLink = <T>(pick: (link: LinkData | null) => T): T =>
+  useDerived(["link"], (store) => pick(store.link));
 export const useNodes = () => useTopic("nodes", (store) => store.nodes);
 export const useAxes = () => useTopic("axes", (store) => store.axes);
 /** What is worked out of one blade's axis; undefined where nothing is known of it. */
