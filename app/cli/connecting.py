@@ -20,17 +20,19 @@ from app.cli.targets import (
     bare_turbine,
     descriptions_for,
     is_bare,
+    line_turbine,
     modbus_turbine,
     scanned_turbine,
     site_turbine,
 )
 from app.drivers.contract import FoundNode
-from app.drivers.modbus_config import MAX_NODE, ModbusConfig, parse_modbus
+from app.drivers.modbus_config import ModbusConfig, parse_modbus
+from app.drivers.profibus_config import parse_profibus
 from app.errors import HubsideError, NoAnswerError, UsageError
 from app.model.address import is_decimal
 from app.model.description import Bus
 from app.model.description_file import BUILTIN, load_builtin
-from app.model.site import Turbine, load_site
+from app.model.site import MAX_NODE, Turbine, load_site
 from app.service.bitrates import with_bitrate, with_bitrates
 from app.service.connection import Connection
 from app.service.identify import Asked, identify
@@ -128,10 +130,10 @@ async def _turbine_with_devices(
     if arguments.modbus is not None:
         return await _modbus_turbine(parse_modbus(arguments.modbus), output, nodes, some)
     turbine = await named_turbine(arguments, output)
-    if arguments.site is not None:
+    if arguments.site is not None or turbine.devices:
         return turbine
     found = await find_nodes(arguments, output, sheets, turbine, nodes)
-    turbine = scanned_turbine(turbine.buses[0].connection, sheets, found)
+    turbine = scanned_turbine(turbine, sheets, found)
     _all_there(nodes, found, turbine)
     return turbine
 
@@ -182,6 +184,8 @@ async def named_turbine(arguments: argparse.Namespace, output: Output) -> Turbin
     if arguments.modbus is not None:
         reason = "a recording of Modbus TCP holds what is asked here, and 'record' asks nothing: serve the page, "
         raise UsageError(reason=reason + "or add --record to another command")
+    if arguments.profibus is not None:
+        return line_turbine(parse_profibus(arguments.profibus))
     turbine = site_turbine(arguments)
     if turbine is None:
         return bare_turbine(await with_bitrate(arguments.can, arguments.listen_s, _Telling(output)))
@@ -223,6 +227,7 @@ def options_of(arguments: argparse.Namespace, record: bool) -> Options:
         consent=arguments.consent,
         listen_s=arguments.listen_s,
         data=settings.data,
+        site=None if arguments.site is None else arguments.site.parent,
         more_recordings=getattr(arguments, "recordings", ()),
     )
 
@@ -240,11 +245,9 @@ def _named_nodes(arguments: argparse.Namespace) -> list[int] | None:
     """The node numbers that the command names: nobody else need be asked. None where it names none."""
     named = getattr(arguments, "target", [])
     texts = [named] if isinstance(named, str) else named
-    return [
-        int(text)
-        for text in texts
-        if is_decimal(text) and 1 <= int(text) <= (127 if arguments.modbus is None else MAX_NODE)
-    ] or None
+    kind = Bus.CANOPEN if arguments.modbus is None else Bus.MODBUS_TCP
+    most = MAX_NODE[kind if arguments.profibus is None else Bus.PROFIBUS_DP]
+    return [int(text) for text in texts if is_decimal(text) and 1 <= int(text) <= most] or None
 
 
 async def find_nodes(

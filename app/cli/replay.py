@@ -19,7 +19,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser.add_argument("recording", nargs="+", type=Path, help="MCAP files; the first one is opened")
     add_port(parser)
     parser.set_defaults(
-        run=_replay, site=None, can=None, modbus=None, turbine=None, eds=[], consent=False, listen_s=0.5
+        run=_replay, site=None, can=None, modbus=None, profibus=None, turbine=None, eds=[], consent=False, listen_s=0.5
     )
     parser.set_defaults(no_record=True, listen=None, tls_cert=None, tls_key=None, host=[], instructor=None)
 

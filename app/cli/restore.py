@@ -109,7 +109,9 @@ def _check(arguments: argparse.Namespace) -> None:
     elif not arguments.set:
         raise UsageError(reason="name the sets to restore: files, or ids of the library")
     if not alone and not is_connected(arguments):
-        raise UsageError(reason="name the bus: --site FILE, --can INTERFACE:CHANNEL or --modbus HOST:PORT")
+        raise UsageError(
+            reason="name the bus: --site FILE, --can INTERFACE:CHANNEL, --modbus HOST:PORT or --profibus PORT@BITRATE"
+        )
     _check_terms(arguments)
 
 

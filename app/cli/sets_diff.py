@@ -52,8 +52,8 @@ def add_actions(actions: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         description=(
             "A COLUMN is a set file, or one of file:PATH, set:ID, live:TARGET, stored:TARGET, default:DEVICE, "
             "golden:DEVICE, delivered:DEVICE, found:DEVICE, left:DEVICE, year:DEVICE. TARGET is TURBINE/STATION/DEVICE "
-            "or a node number, and needs --site, --can or --modbus. Exit code 0 where nothing differs but what "
-            "is bound to the unit, 1 where something does."
+            "or a node number, and needs --site, --can, --modbus or --profibus. Exit code 0 where nothing differs "
+            "but what is bound to the unit, 1 where something does."
         ),
     )
     diff.add_argument("columns", nargs="+", metavar="COLUMN")
@@ -98,7 +98,7 @@ async def _ground(
         ground = replace(ground, library=library, visits=visits)
     if any(one.kind in _BUS for one in specs):
         if not is_connected(arguments):
-            raise UsageError(reason="live and stored columns need a connection (--site, --can or --modbus)")
+            raise UsageError(reason="live and stored columns need a connection (--site, --can, --modbus or --profibus)")
         arguments.target = [one.of for one in specs if one.kind in _BUS]
         connection = await stack.enter_async_context(connected(arguments, output))
         specs = [_by_slug(one, connection) for one in specs]

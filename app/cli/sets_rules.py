@@ -70,7 +70,7 @@ def _rule_row(rule: Rule, output: Output) -> tuple[str, ...]:
 def _check(arguments: argparse.Namespace, output: Output) -> int:
     live = is_connected(arguments)
     if live == bool(arguments.files):
-        raise UsageError(reason="name set files to check, or a connection (--site, --can or --modbus)")
+        raise UsageError(reason="name set files to check, or a connection (--site, --can, --modbus or --profibus)")
     if live:
         return run_command(_check_connected(arguments, output))
     return _tell(check_sets([_read(path) for path in arguments.files]), output)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from app.cli.arguments import seconds
 from app.drivers.contract import FoundNode
 from app.drivers.modbus_config import ModbusConfig
+from app.drivers.profibus_config import ProfibusConfig
 from app.errors import UsageError
 from app.model.address import is_decimal
 from app.model.description import Description
@@ -16,15 +18,18 @@ from app.model.description_file import BUILTIN, load_builtin
 from app.model.eds import EdsWarning, load_eds
 from app.model.servers import MODBUS, Server
 from app.model.site import BusConfig, Device, Station, Turbine, load_site
+from app.model.slaves import PROFIBUS, SlaveSetup
 from app.service.gate import BARE_TURBINE
 
 BUS = "can0"
 MODBUS_BUS = "modbus0"
+PROFIBUS_BUS = "dp0"
+ED2 = "wandfluh-ed2"
 SHEET_SUFFIXES = (".eds", ".dcf")
 
 
 def add_connection(parser: argparse.ArgumentParser, required: bool = True) -> None:
-    """``--site``, ``--can`` or ``--modbus``, and how the connection is made."""
+    """``--site``, ``--can``, ``--modbus`` or ``--profibus``, and how the connection is made."""
     where = parser.add_mutually_exclusive_group(required=required)
     where.add_argument("--site", type=Path, help="site file that names turbines, stations and devices")
     where.add_argument(
@@ -34,6 +39,11 @@ def add_connection(parser: argparse.ArgumentParser, required: bool = True) -> No
         "--modbus",
         metavar="HOST[:PORT][/UNIT][=NODE][,…]",
         help="devices of Modbus TCP; only these addresses are asked: 192.168.2.20, 192.168.2.21=2 …",
+    )
+    where.add_argument(
+        "--profibus",
+        metavar="PORT@BITRATE[,NODE[/TELEGRAM]…]",
+        help="a line of PROFIBUS-DP, and which slaves to run: /dev/ttyUSB0@500000,6/101; all that answer where none is",
     )
     parser.add_argument("--turbine", help="which turbine of the site file, where it names several")
     parser.add_argument(
@@ -111,7 +121,7 @@ def descriptions_for(sheets: Sheets, turbine: Turbine, site: Path | None) -> dic
 
 def is_bare(arguments: argparse.Namespace) -> bool:
     """Whether the bus itself is given, and no site file."""
-    return arguments.can is not None or arguments.modbus is not None
+    return any(one is not None for one in (arguments.can, arguments.modbus, arguments.profibus))
 
 
 def is_connected(arguments: argparse.Namespace) -> bool:
@@ -122,6 +132,15 @@ def is_connected(arguments: argparse.Namespace) -> bool:
 def bare_turbine(connection: str) -> Turbine:
     """A turbine of one CAN bus and no known device yet."""
     return Turbine(BARE_TURBINE, connection, (BusConfig(BUS, connection, 0),), ())
+
+
+def line_turbine(config: ProfibusConfig) -> Turbine:
+    """A turbine of one PROFIBUS line with the slaves that are named."""
+    bus = BusConfig(PROFIBUS_BUS, f"{PROFIBUS}{config.port}", config.baud, master=config.master)
+    devices = tuple(
+        replace(_bare_device(one.node, ED2, PROFIBUS_BUS), slave=SlaveSetup(one.telegram)) for one in config.stations
+    )
+    return Turbine(BARE_TURBINE, f"{config.port}@{config.baud}", (bus,), _bare_stations(devices) if devices else ())
 
 
 def modbus_turbine(config: ModbusConfig, found: Iterable[FoundNode]) -> Turbine:
@@ -142,11 +161,17 @@ def description_id(sheets: Sheets, found: FoundNode) -> str | None:
     return sheets.named_for(found.node) or found.description_id or sheets.for_any()
 
 
-def scanned_turbine(connection: str, sheets: Sheets, found: list[FoundNode]) -> Turbine:
-    """The turbine of one bus with the devices that a scan has recognised, or that an EDS was given for."""
+def scanned_turbine(turbine: Turbine, sheets: Sheets, found: list[FoundNode]) -> Turbine:
+    """``turbine`` of one bus with the devices that a scan has recognised, or that an EDS was given for."""
+    (bus,) = turbine.buses
+    known = {one.node: one for one in turbine.devices}
     described = [(one.node, description_id(sheets, one)) for one in found]
-    devices = tuple(_bare_device(node, description, BUS) for node, description in described if description is not None)
-    return Turbine(BARE_TURBINE, connection, (BusConfig(BUS, connection, 0),), _bare_stations(devices))
+    devices = tuple(
+        known.get(node) or _bare_device(node, description, bus.name)
+        for node, description in described
+        if description is not None
+    )
+    return replace(turbine, stations=_bare_stations(devices))
 
 
 def _bare_device(node: int, description: str, bus: str, address: str = "") -> Device:

@@ -8,19 +8,16 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from app.errors import UsageError
+from app.model.slaves import MASTER, RATES
 from app.wire.profibus.dp import DataExchange, encode_request
 from app.wire.profibus.fdl import MAX_ADDRESS
 from app.wire.profibus.pzd import Order
 from app.wire.profibus.telegrams import TELEGRAM_TYPES, TelegramType
 
-RATES: Final = (9600, 19200, 45450, 93750, 187500, 500000, 1500000, 3000000, 6000000, 12000000)
-"""Bit rates that the ED2 finds by itself (manual, 2.3)."""
 BITS_PER_BYTE: Final = 11
 """Start, eight of data, parity, stop."""
 MAX_CYCLE_S: Final = 0.09
 """The master gives up a Data_Exchange after 100 ms: all stations together have to be done before that."""
-MASTER: Final = 2
-"""Our own address where nothing else is said."""
 DELIVERED_TELEGRAM: Final = 1
 """As the ED2 is delivered (manual, 5.4)."""
 

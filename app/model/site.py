@@ -12,12 +12,14 @@ from typing import Any, Final
 from app.errors import SiteError
 from app.model.description import Bus
 from app.model.servers import MODBUS, Server, parse_range, parse_server
+from app.model.slaves import MASTER, MAX_SLAVE, PROFIBUS, RATE, RATES, UNKNOWN, SlaveSetup, check_setup, port_of
 
 SCHEMA: Final = 1
 HEARTBEAT_NODE: Final = 126
 """Seldom given to a device, and not the last one, which some tools take for themselves."""
-MAX_NODE: Final[Mapping[Bus, int]] = {Bus.CANOPEN: 127, Bus.MODBUS_TCP: 247}
-"""The highest number of a device (CiA 301; Modbus over serial line, 2.2)."""
+MAX_NODE: Final[Mapping[Bus, int]] = {Bus.CANOPEN: 127, Bus.MODBUS_TCP: 247, Bus.PROFIBUS_DP: MAX_SLAVE}
+"""The highest number of a device (CiA 301; Modbus over serial line, 2.2; PROFIBUS)."""
+_OF_SLAVES: Final = "telegram pzd_order gsd modules"
 _SLUG: Final = re.compile(r"^[a-z0-9]+(-[a-z0-9]+)*$")
 
 
@@ -27,7 +29,7 @@ class BusConfig:
 
     ``heartbeat_node`` is the number under which this tool beats while axes are moved; no device may have it.
     ``modbus-tcp`` as the connection: its devices have addresses of their own, all within ``ranges``, and there is no
-    bit rate (0).
+    bit rate (0). ``profibus:PORT`` is a PROFIBUS-DP line; ``master`` is our own address on it.
     """
 
     name: str
@@ -35,10 +37,13 @@ class BusConfig:
     bitrate: int
     heartbeat_node: int = HEARTBEAT_NODE
     ranges: tuple[str, ...] = ()
+    master: int = MASTER
 
     @property
     def kind(self) -> Bus:
         """What is spoken on it."""
+        if self.connection.startswith(PROFIBUS):
+            return Bus.PROFIBUS_DP
         return Bus.MODBUS_TCP if self.connection == MODBUS else Bus.CANOPEN
 
 
@@ -48,7 +53,7 @@ class Device:
 
     ``address`` is where it listens on a Modbus TCP bus (``HOST[:PORT][/UNIT]``); on others it is empty.
     ``external_stop`` names what stops this axis by hand when the tool cannot: without it one that is no twin is not
-    moved where its bus cannot prove that it stops by itself.
+    moved where its bus cannot prove that it stops by itself. ``slave`` is what is known of one on PROFIBUS-DP.
     """
 
     slug: str
@@ -58,6 +63,7 @@ class Device:
     node: int
     address: str = ""
     external_stop: str = ""
+    slave: SlaveSetup = UNKNOWN
 
     @property
     def server(self) -> Server:
@@ -161,6 +167,8 @@ class _Reader:
         turbine = Turbine(slug, str(table.get("name", slug.upper())), buses, stations)
         named = {name for name, bus in self._tables(table, "bus", where) if "heartbeat_node" in bus}
         seen = {(bus.name, bus.heartbeat_node): f"{where}bus.{bus.name}" for bus in buses if bus.name in named}
+        lines = [bus for bus in buses if bus.kind is Bus.PROFIBUS_DP]
+        seen |= {(bus.name, bus.master): f"{where}bus.{bus.name}" for bus in lines}
         servers: dict[str, str] = {}
         for device in turbine.devices:
             other = seen.setdefault((device.bus, device.node), device.slug)
@@ -171,8 +179,12 @@ class _Reader:
         return turbine
 
     def _bus(self, name: str, table: Mapping[str, Any], where: str) -> BusConfig:
-        self._known(table, "connection bitrate heartbeat_node ranges", where)
+        self._known(table, "connection bitrate heartbeat_node ranges master", where)
         connection = self._text(table, "connection", where)
+        if connection.startswith(PROFIBUS):
+            return self._line(name, connection, table, where)
+        if "master" in table:
+            raise self._wrong(f"{where}master", f"is for a bus with connection '{PROFIBUS}PORT'")
         heartbeat = self._node(table, "heartbeat_node", where, HEARTBEAT_NODE)
         if connection != MODBUS:
             if "ranges" in table:
@@ -191,6 +203,20 @@ class _Reader:
                 raise self._wrong(f"{where}ranges", str(error)) from error
         return BusConfig(name, connection, 0, heartbeat, tuple(ranges))
 
+    def _line(self, name: str, connection: str, table: Mapping[str, Any], where: str) -> BusConfig:
+        """One of PROFIBUS-DP."""
+        for key in ("heartbeat_node", "ranges"):
+            if key in table:
+                raise self._wrong(f"{where}{key}", f"is not for a bus with connection '{PROFIBUS}PORT'")
+        try:
+            port_of(connection)
+        except ValueError as error:
+            raise self._wrong(f"{where}connection", str(error)) from error
+        rate = self._int(table, "bitrate", where, RATE)
+        if rate not in RATES:
+            raise self._wrong(f"{where}bitrate", f"is {rate}; PROFIBUS has {', '.join(map(str, RATES))}")
+        return BusConfig(name, connection, rate, master=self._node(table, "master", where, MASTER, MAX_SLAVE))
+
     def _station(self, turbine: str, slug: str, table: Mapping[str, Any], buses: tuple[BusConfig, ...]) -> Station:
         where = f"turbine.{turbine}.station.{slug}."
         self._known(table, "name blade device", where)
@@ -204,7 +230,7 @@ class _Reader:
         return Station(f"{turbine}/{slug}", str(table.get("name", slug.replace("-", " "))), blade, devices)
 
     def _device(self, slug: str, table: Mapping[str, Any], where: str, buses: tuple[BusConfig, ...]) -> Device:
-        self._known(table, "name description bus node address external_stop", where)
+        self._known(table, f"name description bus node address external_stop {_OF_SLAVES}", where)
         bus = str(table.get("bus", buses[0].name if buses else ""))
         config = next((one for one in buses if one.name == bus), None)
         if config is None:
@@ -213,7 +239,29 @@ class _Reader:
         name = str(table.get("name", slug.rsplit("/", 1)[1].upper()))
         description = self._text(table, "description", where)
         stop = self._text(table, "external_stop", where) if "external_stop" in table else ""
-        return Device(slug, name, description, bus, node, self._address(table, config, where), stop)
+        address, slave = self._address(table, config, where), self._slave(table, config, where)
+        return Device(slug, name, description, bus, node, address, stop, slave)
+
+    def _slave(self, table: Mapping[str, Any], bus: BusConfig, where: str) -> SlaveSetup:
+        """What a slave of PROFIBUS-DP is set to."""
+        given = [key for key in _OF_SLAVES.split() if key in table]
+        if bus.kind is not Bus.PROFIBUS_DP:
+            if given:
+                raise self._wrong(f"{where}{given[0]}", f"is for a bus with connection '{PROFIBUS}PORT'")
+            return UNKNOWN
+        modules = table.get("modules", [])
+        if not isinstance(modules, list) or not all(isinstance(one, str) for one in modules):
+            raise self._wrong(f"{where}modules", "is no list of names")
+        setup = SlaveSetup(
+            telegram=self._int(table, "telegram", where, None) if "telegram" in table else None,
+            pzd_order=self._text(table, "pzd_order", where) if "pzd_order" in table else "",
+            gsd=self._text(table, "gsd", where) if "gsd" in table else "",
+            modules=tuple(modules),
+        )
+        flaw = check_setup(setup)
+        if flaw is not None:
+            raise self._wrong(f"{where}{flaw[0]}", flaw[1])
+        return setup
 
     def _address(self, table: Mapping[str, Any], bus: BusConfig, where: str) -> str:
         """Where a device of Modbus TCP listens, within what the bus allows."""

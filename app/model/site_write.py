@@ -20,6 +20,7 @@ from tomlkit.items import InlineTable
 from app.errors import SiteError
 from app.model.description import Bus
 from app.model.site import HEARTBEAT_NODE, SCHEMA, BusConfig, Device, Station, Turbine, read_site
+from app.model.slaves import MASTER
 
 _HEAD: Final = "Turbines, their stations and devices, and where each is found on a bus."
 _KEPT: Final = ".previous"
@@ -114,13 +115,18 @@ def _turbine(table: MutableMapping[str, Any], turbine: Turbine) -> None:
 def _bus(table: MutableMapping[str, Any], bus: BusConfig) -> None:
     _put(table, "connection", bus.connection, None)
     if bus.kind is Bus.MODBUS_TCP:
-        for key in ("bitrate", "heartbeat_node"):
+        for key in ("bitrate", "heartbeat_node", "master"):
             table.pop(key, None)
         if tuple(table.get("ranges", ())) != bus.ranges:
             table["ranges"] = list(bus.ranges)
         return
     table.pop("ranges", None)
     _put(table, "bitrate", bus.bitrate, None)
+    if bus.kind is Bus.PROFIBUS_DP:
+        table.pop("heartbeat_node", None)
+        _put(table, "master", bus.master, MASTER)
+        return
+    table.pop("master", None)
     _put(table, "heartbeat_node", bus.heartbeat_node, HEARTBEAT_NODE)
 
 
@@ -141,6 +147,13 @@ def _device(table: MutableMapping[str, Any], device: Device, first_bus: str) -> 
     _put(table, "node", device.node, None)
     _put(table, "address", device.address or None, None)
     _put(table, "external_stop", device.external_stop or None, None)
+    _put(table, "telegram", device.slave.telegram, None)
+    _put(table, "pzd_order", device.slave.pzd_order or None, None)
+    _put(table, "gsd", device.slave.gsd or None, None)
+    if tuple(table.get("modules", ())) != device.slave.modules:
+        table["modules"] = list(device.slave.modules)
+    if not device.slave.modules:
+        table.pop("modules", None)
 
 
 def last(slug: str) -> str:

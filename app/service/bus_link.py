@@ -6,14 +6,11 @@ from collections.abc import Callable, Mapping, Sequence
 from threading import Lock
 from typing import Any, Protocol
 
-from app.drivers.can_config import CanConfig, parse_can
 from app.drivers.contract import DriverStatus
-from app.drivers.modbus_config import ModbusConfig, ModbusPeer
-from app.drivers.table import driver_class
 from app.model.address import Address
 from app.model.description import Bus, Description
-from app.model.servers import Server
-from app.model.site import BusConfig
+from app.model.site import BusConfig, Turbine
+from app.service.bus_driver import bitrate_of, make_driver
 from app.service.bus_feed import BusFeed
 from app.service.office.foreign_writes import ForeignWrites
 from app.service.options import Options
@@ -37,36 +34,30 @@ Listener = Callable[[Sequence[Record]], None]
 class BusLink(BusFeed):
     """A bus: what its driver hears goes to the recorder first.
 
-    ``on_frames`` runs on the driver's receive thread. ``known`` are the descriptions that a scan may recognise;
-    ``servers`` is where the nodes of a Modbus TCP bus listen.
+    ``on_frames`` runs on the driver's receive thread. ``known`` are the descriptions that a scan may recognise.
     """
 
     def __init__(
         self,
         config: BusConfig,
+        turbine: Turbine,
         descriptions: Mapping[int, Description],
         known: Sequence[Description],
         live: LiveState,
         lock: Lock,
         stamper: Stamper,
         options: Options,
-        servers: Mapping[int, Server] | None = None,
     ) -> None:
         self.kind = config.kind
-        can = None if self.kind is Bus.MODBUS_TCP else _with_rate(config)
-        texts = None if can is not None else {node: server.text for node, server in (servers or {}).items()}
-        super().__init__(config.name, 0 if can is None else can.bitrate, descriptions, live, lock, texts)
+        servers = None
+        if self.kind is Bus.MODBUS_TCP:
+            servers = {node: server.text for node, server in turbine.servers(config.name).items()}
+        super().__init__(config.name, bitrate_of(config), descriptions, live, lock, servers)
         self.adapter = config.connection
         self.sink: FrameSink | None = None
         self.foreign: ForeignWrites | None = None
         self.listeners: tuple[Listener, ...] = ()
-        driver = driver_class(self.kind)
-        self.driver: Any
-        if can is None:
-            peers = tuple(ModbusPeer(node, *server) for node, server in (servers or {}).items())
-            self.driver = driver(ModbusConfig(peers), stamper, config.name, known)
-        else:
-            self.driver = driver(can, stamper, config.name, known, consent=options.consent, listen_s=options.listen_s)
+        self.driver: Any = make_driver(config, turbine, known, stamper, options)
         for node, description in descriptions.items():
             self.describe(node, description)
         self.driver.subscribe(self.on_frames)
@@ -121,7 +112,7 @@ class BusLink(BusFeed):
     @property
     def needs_consent(self) -> bool:
         """Another master is at work, and nobody has consented to active access yet."""
-        return bool(getattr(self.driver, "needs_consent", False))  # TCP shows no other master
+        return bool(getattr(self.driver, "needs_consent", False))  # where only one can be, there is no other master
 
     @property
     def has_pdos(self) -> bool:
@@ -144,8 +135,3 @@ class BusLink(BusFeed):
             if route.source is Source.PDO_RX and carries and route.at_once:
                 return bool(self.driver.command_raw(node, address, Can(route.can_id, data, route.extended)))
         return False
-
-
-def _with_rate(config: BusConfig) -> CanConfig:
-    with_rate = "@" in config.connection or not config.bitrate
-    return parse_can(config.connection if with_rate else f"{config.connection}@{config.bitrate}")

@@ -60,13 +60,13 @@ class Connection:
         self.buses = {
             bus.name: BusLink(
                 bus,
+                turbine,
                 self._by_node(bus.name),
                 tuple(one for one in known if one.bus is bus.kind),
                 self.live,
                 self._lock,
                 self.stamper,
                 options,
-                turbine.servers(bus.name),
             )
             for bus in turbine.buses
         }

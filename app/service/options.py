@@ -12,7 +12,8 @@ class Options:
     """``recordings`` None records nothing; ``consent`` allows active access beside another master on the bus.
 
     ``listen_s`` is how long is listened before anything is sent. ``data`` is the folder of what is kept; None keeps
-    nothing. ``part_closed`` hears of every file of the recording that is complete, on some thread.
+    nothing. ``site`` is the folder of the site file, where paths in it begin. ``part_closed`` hears of every file of
+    the recording that is complete, on some thread.
     """
 
     person: str
@@ -21,4 +22,5 @@ class Options:
     listen_s: float = 0.5
     data: Path | None = None
     more_recordings: tuple[Path, ...] = ()
+    site: Path | None = None
     part_closed: Callable[[Path], object] | None = None

@@ -8,6 +8,7 @@ import {
   IconDownload,
   IconInfoCircle,
 } from "@tabler/icons-react";
+import { memo } from "react";
 import type { EventData } from "../api/types";
 import { useEvents } from "../live/live";
 import type { NumberedEvent } from "../live/store";
@@ -33,7 +34,7 @@ function textOf({ text_key, details, person }: EventData, t: Translate): string 
 }
 
 /** What happened, newest first; closed it still shows the newest. */
-export function EventDrawer() {
+export const EventDrawer = memo(function EventDrawer() {
   const t = useTexts();
   const events = useEvents();
   const nameOf = useDeviceName();
@@ -63,7 +64,7 @@ export function EventDrawer() {
       {open && <EventTable events={events} />}
     </section>
   );
-}
+});
 
 function Severity({ severity }: { severity: EventData["severity"] }) {
   const t = useTexts();

@@ -1,6 +1,6 @@
 import { Outlet, useRouterState } from "@tanstack/react-router";
 import { lazy, Suspense } from "react";
-import { live, ShownContext, useChannel, useHearing, useLiveLink } from "../live/live";
+import { live, ShownContext, useChannel, useHearing, useLiveMode } from "../live/live";
 import { useKeepLease } from "../motion/lease";
 import { ReplayContext, useOpening } from "../replay/opening";
 import { Notices } from "../ui/Notices";
@@ -28,8 +28,7 @@ const LiveRoomNote = lazy(async () => ({ default: (await import("../replay/Repla
  */
 export function Frame() {
   const deaf = useHearing().state !== "hearing";
-  const link = useLiveLink();
-  const mode = link?.state === "connected" ? link.mode : "none";
+  const mode = useLiveMode();
   const path = useRouterState({ select: (state) => state.location.pathname });
   const [search] = usePageSearch();
   const channel = useChannel(search.replay);

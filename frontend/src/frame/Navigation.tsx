@@ -11,6 +11,7 @@ import {
   IconTopologyBus,
 } from "@tabler/icons-react";
 import { Link } from "@tanstack/react-router";
+import { memo } from "react";
 import { useLiveInstructor } from "../live/live";
 import { useTexts } from "../texts/texts";
 import classes from "./Frame.module.css";
@@ -30,7 +31,7 @@ const ICONS: Record<RoomPath, Icon> = {
 };
 
 /** The rooms; the device and the blade that one is about go along. */
-export function Navigation() {
+export const Navigation = memo(function Navigation() {
   const t = useTexts();
   const liveInstructor = useLiveInstructor();
   const ours = liveInstructor?.available === true;
@@ -55,4 +56,4 @@ export function Navigation() {
       })}
     </nav>
   );
-}
+});

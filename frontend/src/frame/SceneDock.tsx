@@ -7,7 +7,7 @@ import {
   IconPlugConnectedX,
 } from "@tabler/icons-react";
 import { useQuery } from "@tanstack/react-query";
-import { useEffect, useMemo, useRef, useState } from "react";
+import { memo, useEffect, useMemo, useRef, useState } from "react";
 import { useTurbineQuery } from "../api/queries";
 import { replayOf } from "../live/channel";
 import { useShown } from "../live/live";
@@ -28,7 +28,7 @@ import { usePageSearch } from "./search";
 import { stopOnEscape } from "./stop";
 
 /** The 3D view, docked at the right; its page is loaded once the rest is there, and only while the dock is open. */
-export function SceneDock() {
+export const SceneDock = memo(function SceneDock() {
   const t = useTexts();
   const [search, update] = usePageSearch();
   const open = search.scene !== "off";
@@ -63,7 +63,7 @@ export function SceneDock() {
       {open && <SceneView />}
     </aside>
   );
-}
+});
 
 const RELOAD_MS = 10_000;
 const UNSEEN_MS = 60_000;

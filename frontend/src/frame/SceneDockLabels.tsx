@@ -2,7 +2,7 @@ import { type Ref, useImperativeHandle, useRef } from "react";
 import { useQueries, useQuery } from "@tanstack/react-query";
 import { useDescriptionQuery, useTurbineQuery } from "../api/queries";
 import type { AxisData } from "../api/types";
-import { useAxes, useWatchDevice } from "../live/live";
+import { useAxis, useWatchDevice } from "../live/live";
 import { axisStateKey, shaftLook } from "../model/axisState";
 import { figure } from "../model/values";
 import { useTexts } from "../texts/texts";
@@ -80,9 +80,10 @@ interface BladeLabelProps {
 
 function BladeLabel({ blade, place, selected, onSelect }: BladeLabelProps) {
   const t = useTexts();
-  const axis = useAxes().get(blade);
-  const look = axis?.look ?? "unknown";
-  const angle = axis?.position_deg == null ? "–" : `${figure(axis.position_deg, 2, t.language)}°`;
+  const { look, state } = useAxis(blade, (axis) => {
+    const seen = axis?.look ?? "unknown";
+    return { look: seen, state: stateWord(t, axis, seen) };
+  });
   return (
     <button
       type="button"
@@ -97,10 +98,18 @@ function BladeLabel({ blade, place, selected, onSelect }: BladeLabelProps) {
     >
       <LookSign look={look} />
       <b>{blade}</b>
-      <span className={classes.angle}>{angle}</span>
-      <span className={classes.state}>{stateWord(t, axis, look)}</span>
+      <BladeAngle blade={blade} />
+      <span className={classes.state}>{state}</span>
     </button>
   );
+}
+
+function BladeAngle({ blade }: { blade: number }) {
+  const { language } = useTexts();
+  const angle = useAxis(blade, (axis) =>
+    axis?.position_deg == null ? "–" : `${figure(axis.position_deg, 2, language)}°`,
+  );
+  return <span className={classes.angle}>{angle}</span>;
 }
 
 /** The axes that stand on a bench, in the order in which the 3D view numbers them. */

@@ -2,10 +2,9 @@ import { Tooltip } from "@mantine/core";
 import { useQueries, useQuery } from "@tanstack/react-query";
 import { descriptionQuery, turbineQuery } from "../api/queries";
 import { IconHandStop, IconWind } from "@tabler/icons-react";
-import { useAxes, useHearing, useLink, useMotion } from "../live/live";
+import { useHearing, useMayMove, useMotionMark, useOfLink } from "../live/live";
 import { useTexts } from "../texts/texts";
 import classes from "./Frame.module.css";
-import { mayMove } from "../live/axis";
 import { placesOf } from "../ui/devices";
 import { entriesOf } from "../ui/reading";
 import { usePageSearch } from "./search";
@@ -14,17 +13,17 @@ import { Halt, useHalt, useLendStop } from "./stop";
 /** Always at the same place. Grey only where nothing is connected; a deaf page still tries. */
 export function StopButtons() {
   const t = useTexts();
-  const link = useLink();
+  const state = useOfLink((link) => link?.state);
   const deaf = useHearing().state === "deaf";
-  const commanded = useMotion()?.running != null;
-  const moving = mayMove(useAxes().values()) || commanded;
+  const commanded = useMotionMark((motion) => motion?.running != null);
+  const moving = useMayMove() || commanded;
   const stop = useHalt(Halt.Stop);
   const feather = useHalt(Halt.Feather);
   const turbine = useQuery(turbineQuery).data?.name;
   const [search] = usePageSearch();
   useLendStop(stop.mutate);
   const feathers = useFeathers();
-  const nothing = !deaf && link?.state === "disconnected";
+  const nothing = !deaf && state === "disconnected";
   return (
     <div className={classes.stops} role="group" aria-label={t("page.stop.group")}>
       {search.replay !== undefined && (

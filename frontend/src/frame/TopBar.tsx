@@ -12,9 +12,10 @@ import {
 } from "@tabler/icons-react";
 import { useComputedColorScheme } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
+import { memo } from "react";
 import { useTurbineQuery } from "../api/queries";
-import type { LinkData, Mode, RecordingStatus } from "../api/types";
-import { useHearing, useLink, useLoadHistory, useServerNow } from "../live/live";
+import type { RecordingStatus } from "../api/types";
+import { useHearing, useLiveMode, useLoadHistory, useOfLink, useServerNow } from "../live/live";
 import { figure } from "../model/values";
 import { ControlMark } from "../motion/ControlMark";
 import { type Translate, useTexts } from "../texts/texts";
@@ -31,14 +32,13 @@ const SECOND_MS = 1000;
 /** The top of the sparkline on a network: more than that of it no drive's traffic takes. */
 const NETWORK_LOAD = 0.01;
 
-export function TopBar() {
-  const link = useLink();
+export const TopBar = memo(function TopBar() {
   return (
     <header className={classes.top}>
       <ConnectMenu />
-      <ModeBadge mode={link?.mode ?? "none"} connected={link?.state === "connected"} />
-      <BusFacts link={link} />
-      <RecordingLight link={link} />
+      <ModeBadge />
+      <BusFacts />
+      <RecordingLight />
       <InstructorMark />
       <div className={classes.spacer} />
       <ControlMark />
@@ -47,7 +47,7 @@ export function TopBar() {
       <StopButtons />
     </header>
   );
-}
+});
 
 const MODE_ICONS = {
   live: IconBroadcast,
@@ -57,10 +57,11 @@ const MODE_ICONS = {
   replay: IconHistory,
 };
 
-function ModeBadge({ mode, connected }: { mode: Mode; connected: boolean }) {
+function ModeBadge() {
   const t = useTexts();
+  const mode = useLiveMode();
   const deaf = useHearing().state === "deaf";
-  const shown = deaf ? "deaf" : connected ? mode : "none";
+  const shown = deaf ? "deaf" : mode;
   const Icon = MODE_ICONS[shown];
   return (
     <span className={classes.badge} data-mode={shown} data-testid="mode" role="status">
@@ -71,67 +72,98 @@ function ModeBadge({ mode, connected }: { mode: Mode; connected: boolean }) {
   );
 }
 
-function BusFacts({ link }: { link: LinkData | null }) {
+function BusFacts() {
   const t = useTexts();
-  const history = useLoadHistory();
   const turbine = useQuery(useTurbineQuery()).data;
+  const link = useOfLink((now) => now && { state: now.state, bus: now.bus, bitrate: now.bitrate });
   if (!link || link.state === "disconnected") return null;
   const connected = link.state === "connected";
   const hasRate = link.bitrate > 0;
-  // What is much to a field bus is little to a network: its load is told more closely.
-  const load = t("page.bus.load", {
-    load: figure(link.load * 100, hasRate ? 0 : 1, t.language).padStart(2, " "),
-  });
   return (
     <div className={`${classes.record} bench`} data-testid="bus">
       <div className={classes.facts}>
-        <strong>{connected ? load : t(`page.link.${link.state}`)}</strong>
+        <strong>{connected ? <Load hasRate={hasRate} /> : t(`page.link.${link.state}`)}</strong>
         <span className="dim">
           {hasRate
             ? t("page.bus.facts", { bus: link.bus, kbit: figure(link.bitrate / 1000, 0, t.language) })
             : t("page.bus.facts_network", { bus: link.bus, connection: turbine?.bus.interface ?? "" })}
         </span>
       </div>
-      {connected && (
-        <Sparkline
-          values={history}
-          max={hasRate ? 1 : NETWORK_LOAD}
-          className={classes.sparkline ?? ""}
-          label={t("page.bus.sparkline")}
-        />
-      )}
+      {connected && <LoadLine max={hasRate ? 1 : NETWORK_LOAD} />}
     </div>
   );
 }
 
-function RecordingLight({ link }: { link: LinkData | null }) {
+/** What is much to a field bus is little to a network: its load is told more closely. */
+function Load({ hasRate }: { hasRate: boolean }) {
   const t = useTexts();
-  const nowMs = useServerNow(SECOND_MS);
-  const recording = link?.recording;
-  if (!recording || link.state === "disconnected") return null;
-  const on = recording.state === "on";
-  const ranMs = recording.since_ns === null ? 0 : nowMs - recording.since_ns / 1e6;
-  const losing = recording.lost > 0;
+  return useOfLink((link) =>
+    t("page.bus.load", {
+      load: figure((link?.load ?? 0) * 100, hasRate ? 0 : 1, t.language).padStart(2, " "),
+    }),
+  );
+}
+
+function LoadLine({ max }: { max: number }) {
+  const t = useTexts();
+  const history = useLoadHistory();
   return (
-    <Tooltip label={recordingTitle(recording, t)}>
+    <Sparkline
+      values={history}
+      max={max}
+      className={classes.sparkline ?? ""}
+      label={t("page.bus.sparkline")}
+    />
+  );
+}
+
+function RecordingLight() {
+  const t = useTexts();
+  const shown = useOfLink((link) =>
+    link === null || link.state === "disconnected"
+      ? null
+      : { on: link.recording.state === "on", title: recordingTitle(link.recording, t) },
+  );
+  if (!shown) return null;
+  return (
+    <Tooltip label={shown.title}>
       <div className={`${classes.record} bench`} data-testid="recording" tabIndex={0}>
-        <span className={classes.light} data-on={on} aria-hidden />
+        <span className={classes.light} data-on={shown.on} aria-hidden />
         <div className={classes.facts}>
-          <strong>
-            {on
-              ? t("page.recording.running", { clock: clock(ranMs) })
-              : t(`page.recording.${recording.state}`)}
-          </strong>
-          <span className={losing ? "tone-error" : "dim"}>
-            {losing && <IconAlertTriangle size={13} aria-hidden />}{" "}
-            {t("page.recording.facts", {
-              size: megabytes(recording.size_bytes, t.language),
-              lost: recording.lost,
-            })}
-          </span>
+          <RecordingTime />
+          <RecordingSize />
         </div>
       </div>
     </Tooltip>
+  );
+}
+
+function RecordingTime() {
+  const t = useTexts();
+  const { state, since_ns } = useOfLink((link) => ({
+    state: link?.recording.state ?? "off",
+    since_ns: link?.recording.since_ns ?? null,
+  }));
+  const nowMs = useServerNow(SECOND_MS);
+  const ranMs = since_ns === null ? 0 : nowMs - since_ns / 1e6;
+  return (
+    <strong>
+      {state === "on" ? t("page.recording.running", { clock: clock(ranMs) }) : t(`page.recording.${state}`)}
+    </strong>
+  );
+}
+
+function RecordingSize() {
+  const t = useTexts();
+  const { losing, words } = useOfLink((link) => {
+    const { size_bytes = 0, lost = 0 } = link?.recording ?? {};
+    const size = megabytes(size_bytes, t.language);
+    return { losing: lost > 0, words: t("page.recording.facts", { size, lost }) };
+  });
+  return (
+    <span className={losing ? "tone-error" : "dim"}>
+      {losing && <IconAlertTriangle size={13} aria-hidden />} {words}
+    </span>
   );
 }
 

@@ -6,16 +6,22 @@
  */
 import {
   createContext,
+  startTransition,
   useCallback,
   useContext,
   useEffect,
+  useEffectEvent,
   useMemo,
+  useReducer,
   useState,
   useSyncExternalStore,
 } from "react";
 import type { TraceFilter } from "../api/trace";
-import type { StopResult } from "../api/types";
+import type { AxisData, LinkData, Mode, MotionData, StopResult } from "../api/types";
+import { alike, Kept } from "./alike";
+import { mayMove } from "./axis";
 import { Channel, contextOf, LIVE } from "./channel";
+import { every } from "./clock";
 import type { TraceView } from "./frames";
 import { paced } from "./pace";
 import { type Beat, LiveSocket, type Urgent } from "./socket";
@@ -71,18 +77,86 @@ function useTopicOf<T>(store: LiveStore, topic: string, read: (store: LiveStore)
 
 const useTopic = <T>(topic: string, read: (store: LiveStore) => T): T => useTopicOf(useStore(), topic, read);
 
+interface Watching<T> {
+  /** Also looked at as time goes on. */
+  everyMs?: number;
+  /** What is alike is not shown anew; by itself `alike`. */
+  same?: (one: T, other: T) => boolean;
+}
+
+/**
+ * What is worked out of the store, looked at whenever one of the topics changes, and shown anew only where it has become
+ * another one. In no hurry: a key that is pressed meanwhile comes first, in the midst of many values too.
+ */
+export const useDerived = <T>(
+  topics: readonly string[],
+  read: (store: LiveStore) => T,
+  watching?: Watching<T>,
+): T => useDerivedOf(useShown(), topics, read, watching);
+
+function useDerivedOf<T>(
+  shown: Channel,
+  topics: readonly string[],
+  read: (store: LiveStore) => T,
+  { everyMs, same = alike }: Watching<T> = {},
+): T {
+  const [, renew] = useReducer((count: number) => count + 1, 0);
+  const [kept] = useState(() => new Kept<T>());
+  const look = useEffectEvent(() => {
+    if (!kept.shows(read(shown.store), same)) startTransition(renew);
+  });
+  const named = topics.join("\n");
+  useEffect(() => {
+    const listener = () => look();
+    const ends = named === "" ? [] : named.split("\n").map((topic) => shown.store.subscribe(topic, listener));
+    if (everyMs !== undefined) ends.push(asTimeGoes(shown, everyMs, listener));
+    listener(); // something may have come between the first rendering and now
+    return () => {
+      for (const end of ends) end();
+    };
+  }, [shown, named, everyMs]);
+  return kept.take(read(shown.store), same);
+}
+
+/** Calls `look` every `everyMs`, and when a cursor is set elsewhere; the answer ends it. */
+function asTimeGoes({ store, recorded }: Channel, everyMs: number, look: () => void): () => void {
+  const standing = () => {
+    if (store.cursor?.playing !== true) look();
+  };
+  const ends = [every(everyMs, look)];
+  if (recorded) ends.push(store.subscribe("bench", look), store.subscribe("cursor", standing));
+  return () => {
+    for (const end of ends) end();
+  };
+}
+
 /** Whether the page hears the bench: one socket brings everything. */
 export const useHearing = () => useTopicOf(liveStore, "hearing", (store) => store.hearing);
+/** What the bench is, "none" while it is not connected. */
+export const useLiveMode = (): Mode =>
+  useTopicOf(liveStore, "link", ({ link }) => (link?.state === "connected" ? link.mode : "none"));
 export const useLiveLink = () => useTopicOf(liveStore, "link", (store) => store.link);
 export const useLiveInstructor = () => useTopicOf(liveStore, "instructor", (store) => store.instructor);
+/** Whether any axis of the bench may move. In a hurry, as it says what Esc is. */
+export const useMayMove = () => useTopicOf(liveStore, "axes", (store) => mayMove(store.axes.values()));
 /** Who may move the axes; always of the bench. */
-export const useMotion = () => useTopicOf(liveStore, "motion", (store) => store.motion);
+export const useMotion = () => useDerivedOf(live, ["motion"], (store) => store.motion);
+/** One mark of it, in a hurry. */
+export const useMotionMark = <T extends string | number | boolean | null>(
+  pick: (motion: MotionData | null) => T,
+): T => useTopicOf(liveStore, "motion", (store) => pick(store.motion));
 export const useLiveBench = () => useTopicOf(liveStore, "bench", (store) => store.bench);
 
 export const useBench = () => useTopic("bench", (store) => store.bench);
 export const useLink = () => useTopic("link", (store) => store.link);
+/** What is worked out of the link; its figures change every second. */
+export const useOfLink = <T>(pick: (link: LinkData | null) => T): T =>
+  useDerived(["link"], (store) => pick(store.link));
 export const useNodes = () => useTopic("nodes", (store) => store.nodes);
 export const useAxes = () => useTopic("axes", (store) => store.axes);
+/** What is worked out of one blade's axis; undefined where nothing is known of it. */
+export const useAxis = <T>(blade: number, pick: (axis: AxisData | undefined) => T): T =>
+  useDerived(["axes"], (store) => pick(store.axes.get(blade)));
 export const useRotor = () => useTopic("rotor", (store) => store.rotor);
 export const useInstructor = () => useTopic("instructor", (store) => store.instructor);
 export const useEvents = () => useTopic("events", (store) => store.events);
@@ -121,19 +195,12 @@ export function watchTrace(channel: Channel, filter: TraceFilter, id: number): (
 
 /** What is now, ms, renewed every `everyMs`: for ages and running clocks. A cursor that is set elsewhere is seen at once. */
 export function useServerNow(everyMs: number): number {
-  const { store, recorded } = useShown();
+  const shown = useShown();
+  const { store } = shown;
   const [now, setNow] = useState(() => store.serverNowMs());
-  useEffect(() => {
-    const look = () => setNow(store.serverNowMs());
-    const timer = setInterval(look, everyMs);
-    const standing = () => {
-      if (store.cursor?.playing !== true) look();
-    };
-    const ends = recorded ? [store.subscribe("bench", look), store.subscribe("cursor", standing)] : [];
-    return () => {
-      clearInterval(timer);
-      for (const end of ends) end();
-    };
-  }, [store, recorded, everyMs]);
+  useEffect(
+    () => asTimeGoes(shown, everyMs, () => startTransition(() => setNow(store.serverNowMs()))),
+    [shown, store, everyMs],
+  );
   return now;
 }

@@ -12,19 +12,23 @@ const SECOND_MS = 1000;
 export function ControlMark() {
   const t = useTexts();
   const { motion, state } = useControl();
-  const nowMs = useServerNow(SECOND_MS);
   const holder = motion?.holder;
   if (!holder) return null;
-  const left = clock(Math.max(0, holder.until_ns / 1e6 - nowMs)).replace(/^00:/, "");
   const own = state === Control.Own;
   return (
     <Tooltip label={t(own ? "page.motion.mark_own" : "page.motion.mark_others", { person: holder.person })}>
       <div className={classes.mark} data-own={own} data-testid="control" tabIndex={0}>
         <IconDeviceGamepad2 size={18} aria-hidden />
         <span>
-          <strong>{own ? t("page.motion.you") : holder.person}</strong> {left}
+          <strong>{own ? t("page.motion.you") : holder.person}</strong>{" "}
+          <Left untilMs={holder.until_ns / 1e6} />
         </span>
       </div>
     </Tooltip>
   );
+}
+
+function Left({ untilMs }: { untilMs: number }) {
+  const nowMs = useServerNow(SECOND_MS);
+  return clock(Math.max(0, untilMs - nowMs)).replace(/^00:/, "");
 }

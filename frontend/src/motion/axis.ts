@@ -2,11 +2,12 @@
 import { useQuery } from "@tanstack/react-query";
 import { interlocksQuery } from "../api/motion";
 import type { StationRef } from "../api/types";
-import { useAxes } from "../live/live";
+import { useDerived, useHearing } from "../live/live";
+import type { LiveStore } from "../live/store";
 import { axisStateKey } from "../model/axisState";
 import type { DeviceContext } from "../model/shown";
 import { quantityOf } from "../model/values";
-import { entriesOf, useReading } from "../ui/reading";
+import { entriesOf, readingIn, readingTopics } from "../ui/reading";
 import { scaledAt } from "./drive";
 
 const POSITION = "6064";
@@ -15,35 +16,68 @@ const STATUSWORD = "6041";
 const TARGET = "607A";
 const SPEED = "60FF";
 
+const REFRESH_MS = 1000;
+
 export interface AxisNow {
   position: number | null;
   velocity: number | null;
   /** Text key of its state. */
   state: string | null;
   stale: boolean;
+  /** Only while it is stale. */
   ageMs: number | null;
 }
 
-/** Where a blade is comes with the axes of the turbine; of another axis its own objects tell. */
-export function useAxisNow(station: StationRef, context: DeviceContext | null): AxisNow {
-  const blade = useAxes().get(station.blade ?? 0);
-  const position = useReading(context, POSITION, "fast");
-  const status = useReading(context, STATUSWORD, "fast");
-  useReading(context, VELOCITY, "fast");
-  if (station.blade !== null)
-    return {
-      position: blade?.position_deg ?? null,
-      velocity: blade?.velocity_dps ?? null,
-      state: blade?.state ?? null,
-      stale: blade?.stale ?? true,
-      ageMs: null,
-    };
+/**
+ * Where a blade is comes with the axes of the turbine; of another axis its own objects tell. What a component picks of it
+ * decides when it is rendered anew.
+ */
+export function useAxisNow<T>(
+  station: StationRef,
+  context: DeviceContext | null,
+  pick: (now: AxisNow) => T,
+): T {
+  const deaf = useHearing().state !== "hearing";
+  const { blade } = station;
+  const topics = blade === null ? readingTopics(context, POSITION, STATUSWORD, VELOCITY) : ["axes"];
+  return useDerived(
+    topics,
+    (store) => pick(axisNowIn(store, station, context, deaf)),
+    blade === null ? { everyMs: REFRESH_MS } : {},
+  );
+}
+
+/** The same as it is known at this moment. */
+export function axisNowIn(
+  store: LiveStore,
+  { blade }: StationRef,
+  context: DeviceContext | null,
+  deaf: boolean,
+): AxisNow {
+  return blade === null ? ofDevice(store, context, deaf) : ofBlade(store, blade);
+}
+
+function ofBlade(store: LiveStore, blade: number): AxisNow {
+  const axis = store.axes.get(blade);
+  return {
+    position: axis?.position_deg ?? null,
+    velocity: axis?.velocity_dps ?? null,
+    state: axis?.state ?? null,
+    stale: axis?.stale ?? true,
+    ageMs: null,
+  };
+}
+
+function ofDevice(store: LiveStore, context: DeviceContext | null, deaf: boolean): AxisNow {
+  const position = context && readingIn(store, context, POSITION, "fast", deaf);
+  const status = context?.lookup(STATUSWORD);
+  const stale = position?.stale ?? true;
   return {
     position: context && position ? scaledAt(context, POSITION) : null,
     velocity: context && scaledAt(context, VELOCITY),
-    state: typeof status?.raw === "number" ? axisStateKey(status.raw) : null,
-    stale: position?.stale ?? true,
-    ageMs: position?.ageMs ?? null,
+    state: typeof status === "number" ? axisStateKey(status) : null,
+    stale,
+    ageMs: stale ? (position?.ageMs ?? null) : null,
   };
 }
 

@@ -4,7 +4,7 @@ import { useMutation } from "@tanstack/react-query";
 import { useEffect } from "react";
 import { moving } from "../api/motion";
 import type { MotionData } from "../api/types";
-import { liveStore, sendBeat, useHearing, useMotion } from "../live/live";
+import { liveStore, sendBeat, useHearing, useMotion, useMotionMark } from "../live/live";
 import { Holding } from "./holding";
 
 export { PAGE };
@@ -19,18 +19,16 @@ export enum Control {
   Others = "others",
 }
 
+function controlOf(motion: MotionData | null): Control {
+  if (motion?.available !== true) return Control.None;
+  if (motion.holder === null) return Control.Free;
+  return motion.holder.page === PAGE ? Control.Own : Control.Others;
+}
+
 /** How control of the axes stands for this page. */
 export function useControl() {
   const motion = useMotion();
-  const holder = motion?.holder ?? null;
-  const state =
-    motion?.available !== true
-      ? Control.None
-      : holder === null
-        ? Control.Free
-        : holder.page === PAGE
-          ? Control.Own
-          : Control.Others;
+  const state = controlOf(motion);
   return {
     motion,
     state,
@@ -42,9 +40,9 @@ export function useControl() {
 
 /** Keeps the number of the lease in step with what the bench says; for one place of the page. */
 export function useKeepLease(): void {
-  const { state, motion } = useControl();
+  const state = useMotionMark(controlOf);
+  const fence = useMotionMark((motion) => (motion?.holder?.page === PAGE ? motion.holder.until_ns : null));
   const deaf = useHearing().state === "deaf";
-  const fence = motion?.holder?.page === PAGE ? motion.holder.until_ns : null;
   useEffect(() => {
     if (state !== Control.Own || deaf) holding.own(null);
     else if (holding.fence === null)

@@ -1,11 +1,13 @@
 import { Link } from "@tanstack/react-router";
+import { memo, type SyntheticEvent } from "react";
+import { useStore } from "../live/live";
 import { type PageSearch, roomSearch } from "../frame/search";
 import type { DeviceContext } from "../model/shown";
 import { hexadecimal, isInteger } from "../model/values";
 import { type Translate, useTexts } from "../texts/texts";
 import classes from "./ReadingText.module.css";
 import { age } from "./format";
-import { type Pace, type Reading, useReading } from "./reading";
+import { type Pace, type Reading, readingIn, useReading } from "./reading";
 
 const DASH = "–";
 
@@ -19,10 +21,16 @@ interface Props {
 }
 
 /** A value with its unit; raw value and age on hover, grey with its age where stale; it leads to its parameter. */
-export function ReadingText({ context, address, pace, instead, tone }: Props) {
+export const ReadingText = memo(function ReadingText({ context, address, pace, instead, tone }: Props) {
   const t = useTexts();
+  const store = useStore();
   const reading = useReading(context, address, pace);
   if (!context || !reading) return <span className="dim">{DASH}</span>;
+  // How old it is says the title: that is put right when somebody comes to read it, not all the time.
+  const look = ({ currentTarget }: SyntheticEvent<HTMLElement>) => {
+    const now = readingIn(store, context, address, pace, false);
+    if (now) currentTarget.title = titleOf(now, t);
+  };
   const words = typeof reading.raw === "number" ? (instead?.(reading.raw) ?? null) : null;
   return (
     <Link
@@ -32,12 +40,14 @@ export function ReadingText({ context, address, pace, instead, tone }: Props) {
       data-stale={reading.stale}
       data-testid={`reading-${address}`}
       title={titleOf(reading, t)}
+      onPointerEnter={look}
+      onFocus={look}
     >
       {words ?? plainText(reading)}
       {reading.stale && <em>{age(reading.ageMs, t.language)}</em>}
     </Link>
   );
-}
+});
 
 /** Where the parameter of an object is shown. */
 export function parameterSearch(device: string, address: string): PageSearch {
@@ -49,13 +59,12 @@ function plainText({ text, unit, names }: Reading): string {
   return unit === "" ? text : `${text} ${unit}`;
 }
 
-export function titleOf(reading: Reading, t: Translate): string {
-  const { entry, raw } = reading;
+function titleOf({ entry, raw, ageMs }: Reading, t: Translate): string {
   const hex = typeof raw === "number" && isInteger(entry) ? ` · ${hexadecimal(entry, raw)}` : "";
   return t("page.reading.title", {
     name: t.nameOf(entry.title),
     address: entry.address,
     raw: `${raw}${hex}`,
-    age: age(reading.ageMs, t.language),
+    age: age(ageMs, t.language),
   });
 }

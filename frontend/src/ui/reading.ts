@@ -3,12 +3,14 @@ import { useQuery } from "@tanstack/react-query";
 import { useMemo } from "react";
 import { useDescriptionQuery } from "../api/queries";
 import type { DescriptionDoc, DeviceRef, EntryDoc, Language, Raw } from "../api/types";
-import { useCell, useHearing, useLink, useNodes, useServerNow, useStore } from "../live/live";
+import { alike } from "../live/alike";
+import { useDerived, useHearing, useStore } from "../live/live";
 import type { Cell, LiveStore } from "../live/store";
 import { type DeviceContext, type Shown, shownOf } from "../model/shown";
 import { figure } from "../model/values";
 import { asVariant, variantOf } from "../model/variant";
 import { useTexts } from "../texts/texts";
+import { age } from "./format";
 
 const REFRESH_MS = 1000;
 
@@ -24,6 +26,7 @@ export interface Reading {
   unit: string;
   names: string[];
   stale: boolean;
+  /** As of when anything that is shown of it changed; while it is stale its age is shown. */
   ageMs: number;
 }
 
@@ -94,19 +97,52 @@ export function readingOf(
   return { entry, raw: cell.raw, text, unit, names, stale, ageMs };
 }
 
-/** The present reading of an object, renewed as it comes and, for its age, once a second. */
+/** Topics by which it is known whether a device is heard; besides whether the page hears the bench. */
+const HEARD = ["nodes", "link"];
+
+/** The present reading of an object, renewed where other words or marks are shown for it. */
 export function useReading(context: DeviceContext | null, address: string, pace: Pace): Reading | null {
-  const slug = context?.slug ?? "";
-  const cell = useCell(slug, address);
-  const silent = useUnheard(slug);
-  const nowMs = useServerNow(REFRESH_MS);
-  return context && readingOf(context, address, cell, pace, nowMs, silent);
+  const deaf = useHearing().state !== "hearing";
+  return useDerived(
+    readingTopics(context, address),
+    (store) => context && readingIn(store, context, address, pace, deaf),
+    { everyMs: REFRESH_MS, same: (one, other) => sameReading(one, other, context?.t.language ?? "en") },
+  );
+}
+
+/** What the reading of an object depends on. */
+export function readingTopics(context: DeviceContext | null, ...addresses: string[]): string[] {
+  return context === null
+    ? []
+    : [...HEARD, ...addresses.map((address) => `value:${context.slug}/${address}`)];
+}
+
+/** The reading of an object as it is now. */
+export function readingIn(
+  store: LiveStore,
+  context: DeviceContext,
+  address: string,
+  pace: Pace,
+  deaf: boolean,
+): Reading | null {
+  const silent = deaf || unheardIn(store, context.slug);
+  return readingOf(context, address, store.cell(context.slug, address), pace, store.serverNowMs(), silent);
+}
+
+/** Nobody sees a difference between them: the age counts only in words, and where it is shown. */
+export function sameReading(one: Reading | null, other: Reading | null, language: Language): boolean {
+  if (one === null || other === null) return one === other;
+  const { ageMs, ...rest } = one;
+  const { ageMs: otherMs, ...otherRest } = other;
+  return alike(rest, otherRest) && (!one.stale || age(ageMs, language) === age(otherMs, language));
+}
+
+function unheardIn(store: LiveStore, slug: string): boolean {
+  return store.link?.state !== "connected" || (store.nodes.get(slug)?.silent ?? false);
 }
 
 /** True while nothing can come from the device: the page is deaf, the bus is gone, or its heartbeat is overdue. */
 export function useUnheard(slug: string): boolean {
-  const hearing = useHearing().state === "hearing";
-  const connected = useLink()?.state === "connected";
-  const node = useNodes().get(slug);
-  return !hearing || !connected || (node?.silent ?? false);
+  const deaf = useHearing().state !== "hearing";
+  return useDerived(HEARD, (store) => deaf || unheardIn(store, slug));
 }

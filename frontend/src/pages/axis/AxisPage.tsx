@@ -1,9 +1,9 @@
 import type { AxisData, StationRef } from "../../api/types";
 import { usePageSearch } from "../../frame/search";
-import { useAxes, useServerNow, useWatchDevice } from "../../live/live";
+import { useAxis, useDerived, useServerNow, useWatchDevice } from "../../live/live";
 import { figure } from "../../model/values";
 import { useTexts } from "../../texts/texts";
-import { entriesOf, useDeviceContext, useReading } from "../../ui/reading";
+import { entriesOf, useDeviceContext } from "../../ui/reading";
 import { measuresOf, useAxisNow } from "../../motion/axis";
 import { severityOf } from "../../model/axisState";
 import type { DeviceContext } from "../../model/shown";
@@ -21,6 +21,9 @@ import { BladePlots, DevicePlots } from "./Plots";
 import { RecordedNote } from "./RecordedNote";
 import { StateDiagram } from "./StateDiagram";
 
+const STATUSWORD = "6041";
+const ERROR_CODE = "603F";
+
 /** One axis in full: its state machine, what it measures, its inputs and outputs, and what moves it. */
 export function AxisPage() {
   return (
@@ -33,36 +36,53 @@ export function AxisPage() {
 }
 
 function Now({ station }: { station: StationRef }) {
-  const t = useTexts();
-  const axis = useAxes().get(station.blade ?? 0);
   const context = useDeviceContext(axisOf(station));
-  const { position, state, stale, ageMs } = useAxisNow(station, context);
-  const { unit, decimals } = measuresOf(context).position;
-  const ofBlade = station.blade !== null;
-  const suffix = ofBlade || unit === "°" ? "°" : ` ${unit}`;
+  const stale = useAxisNow(station, context, (now) => now.stale);
   return (
     <div className={`${classes.now} bench`} data-stale={stale}>
-      <strong data-testid="axis-angle">
-        {position === null ? "–" : `${figure(position, ofBlade ? 2 : decimals, t.language)}${suffix}`}
-      </strong>
-      <span data-testid="axis-state">{state === null ? "–" : t(state)}</span>
-      {stale && axis?.position_t_ns != null && <Age axis={axis} />}
-      {stale && ageMs !== null && (
-        <span className="tone-warning">{t("page.stale", { age: age(ageMs, t.language) })}</span>
-      )}
+      <NowAt station={station} context={context} />
+      <NowIn station={station} context={context} />
+      {stale && <NowSince station={station} context={context} />}
     </div>
   );
 }
 
-/** The device with the controlword; at a station with several the first. */
-const axisOf = (station: StationRef) => station.devices.find((device) => device.axis);
+interface NowProps {
+  station: StationRef;
+  context: DeviceContext | null;
+}
 
-function Age({ axis }: { axis: AxisData }) {
+function NowAt({ station, context }: NowProps) {
   const t = useTexts();
+  const ofBlade = station.blade !== null;
+  const words = useAxisNow(station, context, ({ position }) => {
+    if (position === null) return "–";
+    const { unit, decimals } = measuresOf(context).position;
+    const suffix = ofBlade || unit === "°" ? "°" : ` ${unit}`;
+    return `${figure(position, ofBlade ? 2 : decimals, t.language)}${suffix}`;
+  });
+  return <strong data-testid="axis-angle">{words}</strong>;
+}
+
+function NowIn({ station, context }: NowProps) {
+  const t = useTexts();
+  const state = useAxisNow(station, context, (now) => now.state);
+  return <span data-testid="axis-state">{state === null ? "–" : t(state)}</span>;
+}
+
+/** How old is what is shown. */
+function NowSince({ station, context }: NowProps) {
+  const t = useTexts();
+  const ofDevice = useAxisNow(station, context, ({ ageMs }) => ageMs);
+  const sinceNs = useAxis(station.blade ?? 0, (axis) => axis?.position_t_ns ?? null);
   const nowMs = useServerNow(500);
-  const ageMs = nowMs - (axis.position_t_ns ?? 0) / 1e6;
+  const ageMs = ofDevice ?? (sinceNs === null ? null : nowMs - sinceNs / 1e6);
+  if (ageMs === null) return null;
   return <span className="tone-warning">{t("page.stale", { age: age(ageMs, t.language) })}</span>;
 }
+
+/** The device with the controlword; at a station with several the first. */
+const axisOf = (station: StationRef) => station.devices.find((device) => device.axis);
 
 function Axis({ station }: { station: StationRef }) {
   const t = useTexts();
@@ -71,9 +91,7 @@ function Axis({ station }: { station: StationRef }) {
   useWatchDevice(pmm?.slug ?? null);
   useWatchDevice(drive?.slug ?? null);
   const contexts = { pmm: useDeviceContext(pmm), pmc: useDeviceContext(drive) };
-  const now = useAxisNow(station, contexts.pmc);
-  const blade = useAxes().get(station.blade ?? 0);
-  const faults = useFaults(contexts.pmc, blade?.faults);
+  const faults = useFaults(station, contexts.pmc);
   const [{ replay }] = usePageSearch();
   const name = drive?.name.toUpperCase() ?? "";
   return (
@@ -85,7 +103,7 @@ function Axis({ station }: { station: StationRef }) {
       )}
       <section className={`${classes.panel} ${classes.plots}`} aria-label={t("page.axis.machine")}>
         <h2>{t("page.axis.machine")}</h2>
-        <StateDiagram state={now.state} stale={now.stale} />
+        <StateNow station={station} context={contexts.pmc} />
       </section>
       <section className={`${classes.panel} ${classes.plots}`} aria-label={t("page.axis.plots")}>
         {station.blade !== null ? (
@@ -133,16 +151,25 @@ function Axis({ station }: { station: StationRef }) {
   );
 }
 
+function StateNow({ station, context }: NowProps) {
+  const { state, stale } = useAxisNow(station, context, (now) => ({ state: now.state, stale: now.stale }));
+  return <StateDiagram state={state} stale={stale} />;
+}
+
 /** Those of a blade come with it; of another axis its error code and its statusword tell. */
-function useFaults(
-  context: DeviceContext | null,
-  ofBlade: AxisData["faults"] | undefined,
-): AxisData["faults"] {
-  const reading = useReading(context, "603F", "slow");
-  const status = useReading(context, "6041", "fast");
-  if (ofBlade !== undefined || context === null) return ofBlade ?? [];
-  const code = reading?.raw;
+function useFaults(station: StationRef, context: DeviceContext | null): AxisData["faults"] {
+  const ofBlade = useAxis(station.blade ?? 0, (axis) => axis?.faults);
+  const ofDevice = useDerived(
+    context === null ? [] : [ERROR_CODE, STATUSWORD].map((address) => `value:${context.slug}/${address}`),
+    () => (context === null || ofBlade !== undefined ? [] : faultsOf(context)),
+  );
+  return ofBlade ?? ofDevice;
+}
+
+function faultsOf(context: DeviceContext): AxisData["faults"] {
+  const code = context.lookup(ERROR_CODE);
+  const status = context.lookup(STATUSWORD);
   if (typeof code !== "number" || code === 0) return [];
-  const severity = severityOf(typeof status?.raw === "number" ? status.raw : null);
+  const severity = severityOf(typeof status === "number" ? status : null);
   return [{ device: context.slug, code, text_key: errorIn(context.doc, code)?.text_key ?? null, severity }];
 }

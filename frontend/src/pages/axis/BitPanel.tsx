@@ -1,3 +1,4 @@
+import { memo } from "react";
 import type { BitDoc } from "../../api/types";
 import { fieldMax, fieldOf } from "../../model/bits";
 import type { DeviceContext } from "../../model/shown";
@@ -44,7 +45,7 @@ function hexOf(reading: ReturnType<typeof useReading>): string | null {
   return reading?.text ?? null;
 }
 
-function Bit({ bit, value }: { bit: BitDoc; value: number | null }) {
+const Bit = memo(function Bit({ bit, value }: { bit: BitDoc; value: number | null }) {
   const t = useTexts();
   const field = fieldMax(bit) > 1;
   const state = value === null ? "unknown" : value === 0 ? "clear" : "set";
@@ -59,4 +60,4 @@ function Bit({ bit, value }: { bit: BitDoc; value: number | null }) {
       <span className={classes.clamp}>{bit.clamp ?? bit.bit}</span>
     </li>
   );
-}
+});

@@ -5,7 +5,7 @@ import { useId, useState } from "react";
 import { commands } from "../../api/client";
 import type { AxisData, DescriptionDoc, DeviceRef } from "../../api/types";
 import { NeedsRole } from "../../frame/NeedsRole";
-import { useDeviceVersion } from "../../live/live";
+import { useDerived } from "../../live/live";
 import type { DeviceContext } from "../../model/shown";
 import { type Translate, useTexts } from "../../texts/texts";
 import { errorCode } from "../../ui/format";
@@ -34,7 +34,7 @@ interface Props {
 export function ErrorHistory({ device, context, partner, faults }: Props) {
   const t = useTexts();
   const slug = device?.slug ?? "";
-  useDeviceVersion(slug);
+  const entries = useDerived([`device:${slug}`], () => context && memoryOf(context.lookup));
   const silent = useUnheard(slug);
   const read = useMutation({
     mutationFn: (addresses: string[]) => commands.read(slug, addresses),
@@ -44,7 +44,6 @@ export function ErrorHistory({ device, context, partner, faults }: Props) {
     },
   });
   if (!device || !context) return null;
-  const entries = memoryOf(context.lookup);
   const fault = faults.find((one) => one.device === slug);
   const title = t("page.axis.history", { device: device.name });
   // What the drive would do belongs to what the memory tells.

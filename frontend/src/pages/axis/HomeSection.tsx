@@ -1,7 +1,8 @@
 import { NumberInput } from "@mantine/core";
 import { useState } from "react";
 import { moving } from "../../api/motion";
-import { useAxes } from "../../live/live";
+import { useDerived } from "../../live/live";
+import type { LiveStore } from "../../live/store";
 import { figure } from "../../model/values";
 import { Control, useControl } from "../../motion/lease";
 import motion from "../../motion/Motion.module.css";
@@ -15,28 +16,35 @@ const FEATHER_DEG = 90;
 const AT_REST_DPS = 0.05;
 const WITHOUT_POWER = ["ready_to_switch_on", "switch_on_disabled"];
 
+const axisOf = (store: LiveStore, device: string) =>
+  [...store.axes.values()].find((one) => device.startsWith(one.station));
+
+function restOf(store: LiveStore, device: string) {
+  const axis = axisOf(store, device);
+  return {
+    withoutPower: WITHOUT_POWER.includes(axis?.state?.split(".").at(-1) ?? ""),
+    still: Math.abs(axis?.velocity_dps ?? 1) <= AT_REST_DPS,
+  };
+}
+
 /** Homing, method 35: where the blade stands now is called an angle. Nothing moves; it must stand without power. */
 export function HomeSection({ device }: { device: string }) {
   const t = useTexts();
   const { motion: line, state } = useControl();
   const order = useOrder();
   const [angle, setAngle] = useState(FEATHER_DEG);
-  const axis = [...useAxes().values()].find((one) => device.startsWith(one.station));
+  const rests = useDerived(["axes"], (store) => restOf(store, device));
   const ready = state === Control.Own && line?.prepared.some((one) => one.device === device) === true;
   const busy = order.isPending || line?.running != null;
   const lacks = [
-    ...(WITHOUT_POWER.includes(axis?.state?.split(".").at(-1) ?? "") ? [] : ["page.motion.home_power"]),
-    ...(Math.abs(axis?.velocity_dps ?? 1) <= AT_REST_DPS ? [] : ["page.motion.home_moves"]),
+    ...(rests.withoutPower ? [] : ["page.motion.home_power"]),
+    ...(rests.still ? [] : ["page.motion.home_moves"]),
     ...(ready ? [] : ["page.motion.home_prepare"]),
   ];
   return (
     <section aria-label={t("page.motion.home")}>
       <h3>{t("page.motion.home")}</h3>
-      <p>
-        {t("page.motion.home_explain", {
-          angle: axis?.position_deg == null ? "–" : figure(axis.position_deg, 2, t.language),
-        })}
-      </p>
+      <Explained device={device} />
       <div className={motion.row}>
         <NumberInput
           label={t("page.motion.home_angle")}
@@ -65,4 +73,14 @@ export function HomeSection({ device }: { device: string }) {
       <OrderProblem error={order.error} title={t("page.motion.home_failed")} />
     </section>
   );
+}
+
+/** What it does, with the angle at which the blade stands now. */
+function Explained({ device }: { device: string }) {
+  const t = useTexts();
+  const angle = useDerived(["axes"], (store) => {
+    const deg = axisOf(store, device)?.position_deg;
+    return deg == null ? "–" : figure(deg, 2, t.language);
+  });
+  return <p>{t("page.motion.home_explain", { angle })}</p>;
 }

@@ -2,7 +2,7 @@ import { NumberInput } from "@mantine/core";
 import { useState } from "react";
 import { moving, type Order } from "../../api/motion";
 import type { StationRef } from "../../api/types";
-import { useDeviceVersion } from "../../live/live";
+import { useDerived } from "../../live/live";
 import { measuresOf, useAxisNow, useUnwatched } from "../../motion/axis";
 import { scaledAt } from "../../motion/drive";
 import { Control, useControl } from "../../motion/lease";
@@ -48,13 +48,12 @@ export function MoveSection({ station, device, context }: Props) {
   const { motion: line, state } = useControl();
   const order = useOrder();
   const blade = station.blade !== null;
-  useDeviceVersion(device);
   const [typedSpeed, setSpeed] = useState<number | null>(null);
   const [angle, setAngle] = useState(blade ? USUAL_DEG : 0);
-  const now = useAxisNow(station, context);
-  const measures = measuresOf(context);
-  const most = blade ? MOST_DPS : mostOf(context);
-  const usual = blade ? USUAL_DPS : Math.max(1, Math.round((most ?? 0) / OF_MOST));
+  const known = useAxisNow(station, context, ({ position }) => position !== null);
+  const measures = useDerived([`device:${device}`], () => measuresOf(context));
+  const bound = useDerived([`device:${device}`], () => (blade ? MOST_DPS : mostOf(context)));
+  const usual = blade ? USUAL_DPS : Math.max(1, Math.round((bound ?? 0) / OF_MOST));
   const speed = typedSpeed ?? usual;
   const degrees = measures.position.unit === "°";
   const suffix = degrees ? "°" : ` ${measures.position.unit}`;
@@ -80,7 +79,7 @@ export function MoveSection({ station, device, context }: Props) {
           value={speed}
           onChange={(value) => typedNumber(value, setSpeed)}
           min={0.1}
-          {...(most === undefined ? {} : { max: most })}
+          {...(bound === undefined ? {} : { max: bound })}
           allowNegative={false}
           clampBehavior="strict"
           step={blade ? 0.5 : 10}
@@ -138,9 +137,7 @@ export function MoveSection({ station, device, context }: Props) {
             `${t(`motion.doing.${line.ended.doing}`)}: ${t(ended(line.ended.why))}`}
         </span>
       </div>
-      {context && now.position !== null && (
-        <Preview context={context} from={now.position} to={angle} speed={speed} />
-      )}
+      {context && known && <Preview station={station} context={context} to={angle} speed={speed} />}
       <OrderProblem error={order.error} title={t("page.motion.order_failed")} />
     </section>
   );

@@ -11,6 +11,7 @@ import type { DeviceContext } from "../../model/shown";
 import { localise, quantityOf } from "../../model/values";
 import { useTexts } from "../../texts/texts";
 import { drawnOf, traceOf, useDeviceTrace } from "../../ui/deviceTrace";
+import { whileSeen } from "../../ui/whileSeen";
 import classes from "./Axis.module.css";
 
 const REDRAW_MS = 200;
@@ -148,13 +149,21 @@ function OnePlot({ plot, traceIn, spanS, pausedS }: OnePlotProps) {
     };
     const show = (text: string) => localise(text, language);
     const drawn = new UPlot(options(element, plot, spanS, endS, show), data(), element);
-    const timer = pausedS === null ? setInterval(() => drawn.setData(data()), REDRAW_MS) : null;
+    let shown = "";
+    const redraw = () => {
+      const now = data();
+      // The cursor of a recording may stand still: then nothing is to be drawn.
+      const what = `${endS()} ${now[0].length} ${now[0].at(-1) ?? ""}`;
+      if (what !== shown) drawn.setData(now);
+      shown = what;
+    };
+    const ends = pausedS === null ? whileSeen(element, REDRAW_MS, redraw) : null;
     const observer = new ResizeObserver(() =>
       drawn.setSize({ width: element.clientWidth, height: element.clientHeight }),
     );
     observer.observe(element);
     return () => {
-      if (timer !== null) clearInterval(timer);
+      ends?.();
       observer.disconnect();
       drawn.destroy();
     };

@@ -1,74 +1,125 @@
-import { useDeviceVersion } from "../../live/live";
+import type { StationRef } from "../../api/types";
+import { alike } from "../../live/alike";
+import { useDerived } from "../../live/live";
+import type { LiveStore } from "../../live/store";
 import type { DeviceContext } from "../../model/shown";
 import { figure } from "../../model/values";
-import { measuresOf, wayPerS } from "../../motion/axis";
+import { axisNowIn, measuresOf, wayPerS } from "../../motion/axis";
 import { boundsOf } from "../../motion/drive";
 import motion from "../../motion/Motion.module.css";
 import { type Profile, profileOf, shareAt } from "../../motion/profile";
-import { useTexts } from "../../texts/texts";
+import { type Translate, useTexts } from "../../texts/texts";
 
 interface Props {
+  station: StationRef;
   context: DeviceContext;
   /** In the units of the axis. */
-  from: number;
   to: number;
   speed: number;
 }
 
+/** While the axis moves it comes out otherwise all the time: nobody reads it faster. */
+const RENEW_MS = 200;
 const WIDTH = 260;
 const HEIGHT = 64;
 const POINTS = 60;
 
+interface Outlook {
+  beyond: boolean;
+  falling: boolean;
+  profile: Profile | null;
+  way: string;
+  limits: string | null;
+  unlimited: boolean;
+  bounded: string | null;
+}
+
 /** What will come of a move, by the ramps and limits that the drive holds now. */
-export function Preview({ context, from, to, speed }: Props) {
+export function Preview({ station, context, to, speed }: Props) {
   const t = useTexts();
-  useDeviceVersion(context.slug);
-  const bounds = boundsOf(context, speed);
-  const { lowest, highest, ramps } = bounds;
+  const outlook = useDerived([], (store) => outlookOf(store, station, context, to, speed, t), {
+    everyMs: RENEW_MS,
+    same: sameWords,
+  });
+  if (outlook === null) return null;
+  const { beyond, falling, profile, way, limits, unlimited, bounded } = outlook;
+  return (
+    <div className={motion.preview} data-testid="preview" data-beyond={beyond}>
+      {profile && <Curve profile={profile} falling={falling} />}
+      <p>{way}</p>
+      {limits !== null && <p className={beyond ? "tone-error" : "dim"}>{limits}</p>}
+      {unlimited && <p className="dim">{t("page.motion.preview_no_limits")}</p>}
+      {bounded !== null && <p className="tone-warning">{bounded}</p>}
+    </div>
+  );
+}
+
+/** The curve is drawn by what the words say: it has no finer resolution. */
+function sameWords(one: Outlook | null, other: Outlook | null): boolean {
+  if (one === null || other === null) return one === other;
+  return alike({ ...one, profile: one.profile !== null }, { ...other, profile: other.profile !== null });
+}
+
+/** Null where nobody knows where the axis stands. */
+function outlookOf(
+  store: LiveStore,
+  station: StationRef,
+  context: DeviceContext,
+  to: number,
+  speed: number,
+  t: Translate,
+): Outlook | null {
+  const from = axisNowIn(store, station, context, false).position;
+  if (from === null) return null;
+  const { lowest, highest, ramps, unlimited, bounded } = boundsOf(context, speed);
   const measures = measuresOf(context);
   const perS = wayPerS(measures.position.unit, measures.speed.unit);
   // The way is told in units of position, speeds in units of speed: what both have in common is a factor.
   const profile = perS === null ? null : profileOf((to - from) / perS, ramps);
-  const seconds = (s: number) => figure(s, 1, t.language);
   const place = (number: number) => figure(number, measures.position.decimals, t.language);
   const pace = (number: number) => figure(number, measures.speed.decimals, t.language);
   const beyond = (lowest !== null && to < lowest) || (highest !== null && to > highest);
-  return (
-    <div className={motion.preview} data-testid="preview" data-beyond={beyond}>
-      {profile && <Curve profile={profile} falling={to < from} />}
-      <p>
-        {profile === null
-          ? t("page.motion.preview_unknown")
-          : t("page.motion.preview_axis", {
-              total: seconds(profile.totalS),
-              up: seconds(profile.upS),
-              steady: seconds(profile.steadyS),
-              down: seconds(profile.downS),
-              peak: pace(profile.peakDps),
-              unit: measures.speed.unit,
-            })}
-      </p>
-      {lowest !== null && highest !== null && (
-        <p className={beyond ? "tone-error" : "dim"}>
-          {t(beyond ? "page.motion.preview_axis_beyond" : "page.motion.preview_axis_within", {
+  return {
+    beyond,
+    falling: to < from,
+    profile,
+    way: wayText(profile, pace, measures.speed.unit, t),
+    limits:
+      lowest === null || highest === null
+        ? null
+        : t(beyond ? "page.motion.preview_axis_beyond" : "page.motion.preview_axis_within", {
             low: place(lowest),
             high: place(highest),
             unit: measures.position.unit,
-          })}
-        </p>
-      )}
-      {bounds.unlimited && <p className="dim">{t("page.motion.preview_no_limits")}</p>}
-      {bounds.bounded !== null && (
-        <p className="tone-warning">
-          {t("page.motion.preview_axis_bounded", {
+          }),
+    unlimited,
+    bounded:
+      bounded === null
+        ? null
+        : t("page.motion.preview_axis_bounded", {
             speed: pace(ramps.speedDps),
             unit: measures.speed.unit,
-            object: `${bounds.bounded}h`,
-          })}
-        </p>
-      )}
-    </div>
-  );
+            object: `${bounded}h`,
+          }),
+  };
+}
+
+function wayText(
+  profile: Profile | null,
+  pace: (speed: number) => string,
+  unit: string,
+  t: Translate,
+): string {
+  if (profile === null) return t("page.motion.preview_unknown");
+  const seconds = (s: number) => figure(s, 1, t.language);
+  return t("page.motion.preview_axis", {
+    total: seconds(profile.totalS),
+    up: seconds(profile.upS),
+    steady: seconds(profile.steadyS),
+    down: seconds(profile.downS),
+    peak: pace(profile.peakDps),
+    unit,
+  });
 }
 
 /** Angle and speed over time, both from end to end. */

@@ -1,4 +1,5 @@
-import { useDeviceVersion } from "../../live/live";
+import { useMemo } from "react";
+import { useDerived } from "../../live/live";
 import { fieldOf } from "../../model/bits";
 import type { DeviceContext } from "../../model/shown";
 import { type Translate, useTexts } from "../../texts/texts";
@@ -16,7 +17,6 @@ const FIRST = 1;
 /** From where the bits of the inputs and the outputs come, where the drive routes them. */
 export function Routing({ context }: { context: DeviceContext | null }) {
   const t = useTexts();
-  useDeviceVersion(context?.slug ?? "");
   if (context === null) return null;
   return (
     <>
@@ -46,11 +46,19 @@ interface TableProps {
 /** What is fed by something; a place that is always 0 says nothing. */
 function Table({ context, index, title, nameOf }: TableProps) {
   const t = useTexts();
-  const entries = [...entriesOf(context.doc).keys()].filter(
-    (address) => address.startsWith(`${index}:`) && address !== `${index}:00`,
+  const { doc, slug, lookup } = context;
+  const entries = useMemo(
+    () =>
+      [...entriesOf(doc).keys()].filter(
+        (address) => address.startsWith(`${index}:`) && address !== `${index}:00`,
+      ),
+    [doc, index],
+  );
+  const fed = useDerived(
+    entries.map((address) => `value:${slug}/${address}`),
+    () => entries.filter((address) => lookup(address) !== 0),
   );
   if (entries.length === 0) return null;
-  const fed = entries.filter((address) => context.lookup(address) !== 0);
   return (
     <section
       className={`${classes.panel} ${classes.plots}`}

@@ -3,7 +3,7 @@ import { useQuery } from "@tanstack/react-query";
 import { useState } from "react";
 import { runQuery, type SignalSettings } from "../../api/signals";
 import { usePageSearch } from "../../frame/search";
-import { useAxes } from "../../live/live";
+import { useDerived } from "../../live/live";
 import { figure } from "../../model/values";
 import motion from "../../motion/Motion.module.css";
 import { OrderProblem } from "../../motion/OrderProblem";
@@ -23,11 +23,8 @@ export function SignalSection({ device }: { device: string }) {
   const [search, update] = usePageSearch();
   const [settings, setSettings] = useState<SignalSettings>(USUAL.sine);
   const signal = useSignalRun(device);
-  const axis = [...useAxes().values()].find((one) => device.startsWith(one.station));
   const run = useQuery({ ...runQuery(search.run ?? ""), enabled: search.run !== undefined }).data;
   const over = useQuery({ ...runQuery(search.over ?? ""), enabled: search.over !== undefined }).data;
-  const deg = (number: number) => figure(number, 2, t.language);
-  const [low, high] = reach(settings, axis?.position_deg ?? 0);
   return (
     <section className={classes.wide} aria-label={t("page.signal.title")} data-testid="signal">
       <h3>{t("page.signal.title")}</h3>
@@ -53,9 +50,11 @@ export function SignalSection({ device }: { device: string }) {
           {t("page.signal.run", { shape: t(`page.signal.shape.${settings.shape}`) })}
         </RunButton>
         <span className={motion.ended}>
-          {signal.ready
-            ? axis?.position_deg != null && t("page.signal.reach", { low: deg(low), high: deg(high) })
-            : t(signal.own ? "page.signal.prepare_first" : "page.signal.control_first")}
+          {signal.ready ? (
+            <Reach device={device} settings={settings} />
+          ) : (
+            t(signal.own ? "page.signal.prepare_first" : "page.signal.control_first")
+          )}
         </span>
       </div>
       <OrderProblem error={signal.error} title={t("page.signal.failed")} />
@@ -75,4 +74,16 @@ export function SignalSection({ device }: { device: string }) {
       />
     </section>
   );
+}
+
+/** The angles between which the signal would stay if it began here. */
+function Reach({ device, settings }: { device: string; settings: SignalSettings }) {
+  const t = useTexts();
+  const deg = (number: number) => figure(number, 2, t.language);
+  return useDerived(["axes"], (store) => {
+    const axis = [...store.axes.values()].find((one) => device.startsWith(one.station));
+    if (axis?.position_deg == null) return null;
+    const [low, high] = reach(settings, axis.position_deg);
+    return t("page.signal.reach", { low: deg(low), high: deg(high) });
+  });
 }

@@ -1,6 +1,6 @@
 import { useState } from "react";
 import { type BrakeTest, type Feathered, moving, type Order } from "../../api/motion";
-import { useDeviceVersion } from "../../live/live";
+import { useDerived } from "../../live/live";
 import type { DeviceContext } from "../../model/shown";
 import { figure } from "../../model/values";
 import { scaledAt } from "../../motion/drive";
@@ -20,10 +20,18 @@ const BRAKE = "brake";
 /** A blade that stands so near at its target has not been driven. */
 const AT_TARGET_DEG = 0.5;
 
+/** Which trials the drive has, and where its feather position is. */
+function trialsOf(context: DeviceContext | null) {
+  return {
+    feathers: context !== null && entriesOf(context.doc).has(FEATHER_TARGET),
+    hasBrake: context !== null && bitState(context, OUTPUTS, BRAKE) !== null,
+    target: context === null ? null : scaledAt(context, FEATHER_TARGET),
+  };
+}
+
 /** Trials of one axis, each as long as it is held: enabled and standing, its EFC, its brake. */
 export function TrySection({ device, context }: { device: string; context: DeviceContext | null }) {
   const t = useTexts();
-  useDeviceVersion(device);
   const { motion: line, state } = useControl();
   const order = useOrder();
   const [feathered, setFeathered] = useState<Feathered | null>(null);
@@ -31,9 +39,7 @@ export function TrySection({ device, context }: { device: string; context: Devic
   const ready = state === Control.Own && line?.prepared.some((one) => one.device === device) === true;
   const disabled = !ready || order.isPending || line.running !== null;
   const doing = line?.running?.device === device ? line.running.doing : null;
-  const feathers = context !== null && entriesOf(context.doc).has(FEATHER_TARGET);
-  const hasBrake = context !== null && bitState(context, OUTPUTS, BRAKE) !== null;
-  const target = context === null ? null : scaledAt(context, FEATHER_TARGET);
+  const { feathers, hasBrake, target } = useDerived([`device:${device}`], () => trialsOf(context));
   const hold = (work: (one: Order) => Promise<unknown>) => {
     setFeathered(null);
     setBrake(null);

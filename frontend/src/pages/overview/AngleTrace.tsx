@@ -6,6 +6,7 @@ import { useStore } from "../../live/live";
 import { TRACE_S } from "../../live/trace";
 import { useTexts } from "../../texts/texts";
 import { localise } from "../../model/values";
+import { whileSeen } from "../../ui/whileSeen";
 import classes from "./Overview.module.css";
 
 const REDRAW_MS = 200;
@@ -36,11 +37,11 @@ export function AngleTrace({ blade, label }: { blade: number; label: string }) {
       columns(),
       element,
     );
-    const timer = setInterval(() => plot.setData(columns()), REDRAW_MS);
+    const ends = whileSeen(element, REDRAW_MS, () => plot.setData(columns()));
     const observer = new ResizeObserver(() => plot.setSize(sizeOf(element)));
     observer.observe(element);
     return () => {
-      clearInterval(timer);
+      ends();
       observer.disconnect();
       plot.destroy();
     };

@@ -1,6 +1,6 @@
 import { IconAlertOctagon, IconAlertTriangle } from "@tabler/icons-react";
 import type { ReactNode } from "react";
-import { useDeviceVersion } from "../../live/live";
+import { useDerived } from "../../live/live";
 import type { DeviceContext } from "../../model/shown";
 import { useTexts } from "../../texts/texts";
 import { ReadingText } from "../../ui/ReadingText";
@@ -69,9 +69,9 @@ export function BladeFacts({ pmm, pmc }: Contexts) {
 
 function TemperatureLine({ spot, context }: { spot: Temperature; context: DeviceContext | null }) {
   const t = useTexts();
-  useDeviceVersion(context?.slug ?? "");
-  const limit = (address: string) => context?.lookup(address) ?? null;
-  const tone = context ? temperatureTone(context.lookup(spot.address), spot, limit) : undefined;
+  const tone = useDerived([`device:${context?.slug ?? ""}`], () =>
+    context ? temperatureTone(context.lookup(spot.address), spot, context.lookup) : undefined,
+  );
   const Icon = tone === "error" ? IconAlertOctagon : IconAlertTriangle;
   return (
     <div className={classes.temperature}>
@@ -106,10 +106,10 @@ function Charger({ pmm }: { pmm: DeviceContext | null }) {
 
 function Brake({ pmc }: { pmc: DeviceContext | null }) {
   const t = useTexts();
-  useReading(pmc, "60FE:03", "slow");
-  const brake = pmc && bitState(pmc, "60FE:03", "brake");
-  const words =
-    brake?.set == null ? null : t(brake.set ? "page.card.brake_released" : "page.card.brake_applied");
+  const words = useDerived([`value:${pmc?.slug ?? ""}/60FE:03`], () => {
+    const brake = pmc && bitState(pmc, "60FE:03", "brake");
+    return brake?.set == null ? null : t(brake.set ? "page.card.brake_released" : "page.card.brake_applied");
+  });
   return <ReadingText context={pmc} address="60FE:03" pace="slow" instead={() => words} />;
 }
 
