@@ -17,7 +17,7 @@ from app.wire.trace.filter import MeansText, TraceFilter, addresses_of, parse_da
 from app.wire.trace.service import Service
 from app.wire.trace.tracer import Tone, TraceRow
 
-_PLAIN: Final = (Service.SDO_REQUEST, Service.SDO_RESPONSE, Service.TPDO, Service.RPDO)
+_PLAIN: Final = (Service.SDO_REQUEST, Service.SDO_RESPONSE, Service.TPDO, Service.RPDO, Service.FDL_SAME)
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,6 +76,8 @@ def _means(q: str, targets: list[Target], namer: Namer) -> MeansText | None:
         for address in addresses_of(row):
             if address in objects or wanted in address.short.casefold():
                 return True
+        if row.fdl is not None and row.step is not None and wanted in _text(row.step.text_key):
+            return True
         notes = () if _says_nothing(row) else notes_of(row, namer)
         return any(wanted in words for note in notes for words in _words(note))
 
@@ -83,7 +85,7 @@ def _means(q: str, targets: list[Target], namer: Namer) -> MeansText | None:
 
 
 def _says_nothing(row: TraceRow) -> bool:
-    """True for the bulk of the traffic, SDO and PDO that went well: its notes are figures at most."""
+    """True for the bulk of the traffic, SDO, PDO and PROFIBUS without news: its notes are figures at most."""
     return row.tone is Tone.PLAIN and row.speaker.service in _PLAIN
 
 
@@ -91,6 +93,12 @@ def _says_nothing(row: TraceRow) -> bool:
 def _folded(english: str) -> str:
     """A name in all languages, folded."""
     return "\n".join((english, *(load_texts(language).name(english) for language in LANGUAGES))).casefold()
+
+
+@lru_cache(maxsize=256)
+def _text(key: str) -> str:
+    """A text in all languages, folded."""
+    return "\n".join(load_texts(language)(key) for language in LANGUAGES).casefold()
 
 
 def objects_named(description: Description, wanted: str) -> frozenset[Address]:
