@@ -70,6 +70,7 @@ wheel: $(VENV)/.ready frontend/dist/index.html
 recordings: $(VENV)/.ready
 	$(BIN)/hubside twin record recordings/scenarios/*.toml
 	$(PY) -m tests.recording.make_pd4e
+	$(PY) -m tests.recording.make_ed2
 
 screenshots: setup
 	$(PY) -m tests.e2e.screenshots

@@ -12,7 +12,7 @@ from app.wire.busload import BusLoad
 from app.wire.frame import Direction, Fdl, Frame
 from app.wire.profibus import dp, pkw
 from app.wire.profibus.configuration import Length, Module
-from app.wire.profibus.control import Reply
+from app.wire.profibus.control import Reply, Station
 from app.wire.profibus.decoder import ProfibusDecoder
 from app.wire.profibus.diagnosis import Diagnosis, Status
 from app.wire.profibus.dp import DataExchange, Inputs, Refused
@@ -62,7 +62,7 @@ def test_each_service_is_told_with_its_ends() -> None:
     line = Line()
     modules = (Module(Length(14), Length(14), special=True),)
     frames = [
-        *line.served(dp.FdlStatus(), dp.StatusAnswer(dp.Station.SLAVE)),
+        *line.served(dp.FdlStatus(), dp.StatusAnswer(Station.SLAVE)),
         *line.served(dp.SlaveDiag(), dp.DiagnosisAnswer(STATION)),
         *line.served(dp.SetPrm(0x0ED2, watchdog=(10, 10)), dp.Done()),
         *line.served(dp.ChkCfg(modules), dp.Done()),

@@ -54,11 +54,16 @@ def test_zero_and_parameters_that_are_not_sent_prove_nothing() -> None:
 def test_the_setting_of_the_site_decides_between_words_only_where_bytes_are_proven() -> None:
     proof = OrderProof()
     proof.setting = AS_PKW
-    assert proof.order is None
+    before = proof.order
     proof.take(ONE, STATUS, word(0x0837), sent(AS_PKW, 0x0837, 0))
-    assert proof.order == AS_PKW
+    assert (before, proof.order) == (None, AS_PKW)
+
+
+def test_a_setting_that_the_line_has_refuted_is_not_in_force() -> None:
+    proof = OrderProof()
     proof.setting = AS_PRINTED
-    assert proof.order is None, "the line has refuted it"
+    proof.take(ONE, STATUS, word(0x0837), sent(AS_PKW, 0x0837, 0))
+    assert (proof.byte, proof.order) == (First.HIGH, None)
 
 
 def test_a_value_that_changed_meanwhile_refutes_nothing_and_another_device_begins_the_proof_anew() -> None:
