@@ -4,7 +4,7 @@ import { lazy, Suspense } from "react";
 import type { AxisData, DeviceRef, StationRef } from "../../api/types";
 import { type PageSearch, roomSearch } from "../../frame/search";
 import { followsDemand } from "../../live/axis";
-import { useAxes, useNodes, useServerNow, useWatchDevice } from "../../live/live";
+import { useAxis, useDerived, useServerNow, useWatchDevice } from "../../live/live";
 import { figure } from "../../model/values";
 import { useTexts } from "../../texts/texts";
 import { stationName } from "../../ui/devices";
@@ -24,7 +24,7 @@ const DASH = "–";
 export function BladeCard({ station }: { station: StationRef }) {
   const t = useTexts();
   const blade = station.blade ?? 0;
-  const axis = useAxes().get(blade);
+  const stale = useAxis(blade, (axis) => axis?.stale ?? true);
   const name = stationName(station, t);
   const pmm = station.devices.find((device) => device.description_id === PMM);
   const pmc = station.devices.find((device) => device.description_id === PMC);
@@ -32,12 +32,7 @@ export function BladeCard({ station }: { station: StationRef }) {
   useWatchDevice(pmc?.slug ?? null);
   const contexts = { pmm: useDeviceContext(pmm), pmc: useDeviceContext(pmc) };
   return (
-    <article
-      className={classes.card}
-      aria-label={name}
-      data-testid={`blade-${blade}`}
-      data-stale={axis?.stale ?? true}
-    >
+    <article className={classes.card} aria-label={name} data-testid={`blade-${blade}`} data-stale={stale}>
       <h2>
         {name}
         <Link
@@ -49,8 +44,8 @@ export function BladeCard({ station }: { station: StationRef }) {
         </Link>
       </h2>
       <div className={`${classes.body} bench`}>
-        <Angle axis={axis} />
-        <DriveState axis={axis} />
+        <Angle blade={blade} />
+        <DriveState blade={blade} />
         <dl className={classes.facts}>
           {station.devices.map((device) => (
             <NodeLine key={device.slug} device={device} />
@@ -68,22 +63,29 @@ export function BladeCard({ station }: { station: StationRef }) {
   );
 }
 
-function Angle({ axis }: { axis: AxisData | undefined }) {
+function Angle({ blade }: { blade: number }) {
   const t = useTexts();
-  const stale = axis?.stale ?? true;
+  const words = (deg: number | null | undefined) => (deg == null ? DASH : `${figure(deg, 2, t.language)}°`);
+  const { angle, demand, follows, stale, sinceNs } = useAxis(blade, (axis) => ({
+    angle: words(axis?.position_deg),
+    demand: words(axis?.demand_deg),
+    follows: axis !== undefined && followsDemand(axis),
+    stale: axis?.stale ?? true,
+    sinceNs: axis?.stale ? axis.position_t_ns : null,
+  }));
   return (
     <div className={classes.angle}>
       <div className={classes.big} data-stale={stale} data-testid="angle">
-        {axis?.position_deg == null ? DASH : `${figure(axis.position_deg, 2, t.language)}°`}
+        {angle}
       </div>
       <div className={classes.demand}>
-        {stale && axis?.position_t_ns != null ? (
-          <Age sinceMs={axis.position_t_ns / 1e6} />
+        {sinceNs !== null ? (
+          <Age sinceMs={sinceNs / 1e6} />
         ) : (
           <>
             <span className="dim">{t("page.card.demand")}</span>
-            <span data-testid="demand" data-stale={!axis || !followsDemand(axis)} className={classes.figure}>
-              {axis?.demand_deg == null ? DASH : `${figure(axis.demand_deg, 2, t.language)}°`}
+            <span data-testid="demand" data-stale={!follows} className={classes.figure}>
+              {demand}
             </span>
           </>
         )}
@@ -98,19 +100,22 @@ function Age({ sinceMs }: { sinceMs: number }) {
   return <span className="tone-warning">{t("page.stale", { age: age(nowMs - sinceMs, t.language) })}</span>;
 }
 
-function DriveState({ axis }: { axis: AxisData | undefined }) {
+function DriveState({ blade }: { blade: number }) {
   const t = useTexts();
-  const faults = axis?.faults ?? [];
+  const { state, stale, faults, known } = useAxis(blade, (axis) => ({
+    state: axis?.state ?? null,
+    stale: axis?.stale ?? true,
+    faults: axis?.faults ?? [],
+    known: axis?.fault_code === 0,
+  }));
   return (
     <>
-      <div className={classes.state} data-testid="state" data-stale={axis?.stale ?? true}>
-        {axis?.state == null ? DASH : t(axis.state)}
+      <div className={classes.state} data-testid="state" data-stale={stale}>
+        {state === null ? DASH : t(state)}
       </div>
       <div className={classes.faults} data-testid="fault">
         {faults.length === 0 && (
-          <span className="dim">
-            {t(axis?.fault_code === 0 ? "page.card.no_fault" : "page.card.fault_unknown")}
-          </span>
+          <span className="dim">{t(known ? "page.card.no_fault" : "page.card.fault_unknown")}</span>
         )}
         {faults.map((fault) => (
           <Complaint key={`${fault.device} ${fault.code}`} {...fault} />
@@ -139,15 +144,23 @@ const HEARD_TONES = { [Heard.Never]: "dim", [Heard.Alive]: "", [Heard.Overdue]: 
 
 function NodeLine({ device }: { device: DeviceRef }) {
   const t = useTexts();
-  const node = useNodes().get(device.slug);
-  const { heard, ageMs } = heartbeatOf(node, useServerNow(REFRESH_MS));
+  const { nmt, heard, words } = useDerived(
+    ["nodes"],
+    (store) => {
+      const node = store.nodes.get(device.slug);
+      const { heard, ageMs } = heartbeatOf(node, store.serverNowMs());
+      const words = ageMs === null ? t("page.card.no_heartbeat") : `♥ ${age(ageMs, t.language)}`;
+      return { nmt: node?.nmt ?? "unknown", heard, words };
+    },
+    { everyMs: REFRESH_MS },
+  );
   return (
     <Fact name={device.name}>
-      <span className={classes.nmt} data-nmt={node?.nmt ?? "unknown"}>
-        {t(`page.nmt.${(node?.nmt ?? "unknown").replace("-", "_")}`)}
+      <span className={classes.nmt} data-nmt={nmt}>
+        {t(`page.nmt.${nmt.replace("-", "_")}`)}
       </span>
       <span className={HEARD_TONES[heard]} title={t("page.card.heartbeat")}>
-        {ageMs === null ? t("page.card.no_heartbeat") : `♥ ${age(ageMs, t.language)}`}
+        {words}
       </span>
     </Fact>
   );

@@ -67,10 +67,14 @@ export function BladeFacts({ pmm, pmc }: Contexts) {
   );
 }
 
+const judgedBy = ({ address, warning, error, low }: Temperature) =>
+  [address, warning, error, low].filter((one) => one !== null);
+
 function TemperatureLine({ spot, context }: { spot: Temperature; context: DeviceContext | null }) {
   const t = useTexts();
-  const tone = useDerived([`device:${context?.slug ?? ""}`], () =>
-    context ? temperatureTone(context.lookup(spot.address), spot, context.lookup) : undefined,
+  const tone = useDerived(
+    context === null ? [] : judgedBy(spot).map((address) => `value:${context.slug}/${address}`),
+    () => (context ? temperatureTone(context.lookup(spot.address), spot, context.lookup) : undefined),
   );
   const Icon = tone === "error" ? IconAlertOctagon : IconAlertTriangle;
   return (
