@@ -9,9 +9,9 @@ from app.errors import UsageError
 from app.model.axis_machine import CIA402, StateMachine
 from app.service.motion.commanding import Commanding
 from app.service.motion.control import Control
-from app.service.motion.hydraulic import HydraulicControl
+from app.service.motion.hydraulic import DSP408, HydraulicControl
 
-_CONTROLS: Final[Mapping[str, type[Commanding]]] = {CIA402: Control, "dsp408": HydraulicControl}
+_CONTROLS: Final[Mapping[str, type[Commanding]]] = {CIA402: Control, DSP408: HydraulicControl}
 
 
 def control_class(machine: StateMachine) -> type[Commanding]:

@@ -35,6 +35,7 @@ ACTUAL: Final = _pkw(12, 100)
 RAPID_VELOCITY: Final = _pkw(12, 216)
 CREEP_VELOCITY: Final = _pkw(12, 217)
 
+DSP408: Final = "dsp408"
 LOCAL_CONTROL: Final = 1 << 4
 TARGET_REACHED: Final = 1 << 12
 ACKNOWLEDGED: Final = 1 << 13
@@ -146,14 +147,18 @@ class HydraulicControl(Commanding):
 
     async def require_adjustable(self) -> None:
         """Raises AxisStateError where modes cannot be changed: the axis has power, is locally driven, or moves."""
-        status, state = await self.status(), await self.state()
-        if state.name not in ("init", "disabled"):
-            raise self._otherwise(state, "init", "disabled")
-        if status & LOCAL_CONTROL:
+        await self.require_off()
+        if await self.status() & LOCAL_CONTROL:
             raise AxisStateError(
                 device=self.target.slug, state_key="hydraulic.found.local", wanted_key="hydraulic.needed.bus"
             )
         await self.require_still()
+
+    async def require_off(self) -> None:
+        """Raises AxisStateError where the axis has power or a fault."""
+        state = await self.state()
+        if state.name not in ("init", "disabled"):
+            raise self._otherwise(state, "init", "disabled")
 
     async def require_still(self) -> None:
         """Raises AxisStateError where the axis moves."""

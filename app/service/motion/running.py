@@ -24,6 +24,7 @@ class Doing(Enum):
     FEATHER = "feather"
     BRAKE_TEST = "brake_test"
     SIGNAL = "signal"
+    OPERATION = "operation"
 
 
 class Ended(Enum):
