@@ -3,17 +3,11 @@ import { useQuery } from "@tanstack/react-query";
 import { interlocksQuery } from "../api/motion";
 import type { StationRef } from "../api/types";
 import { useAxes } from "../live/live";
-import { axisStateKey } from "../model/axisState";
 import type { DeviceContext } from "../model/shown";
+import { objectsOf, stateKeyOf } from "../model/stateMachine";
 import { quantityOf } from "../model/values";
 import { entriesOf, useReading } from "../ui/reading";
 import { scaledAt } from "./drive";
-
-const POSITION = "6064";
-const VELOCITY = "606C";
-const STATUSWORD = "6041";
-const TARGET = "607A";
-const SPEED = "60FF";
 
 export interface AxisNow {
   position: number | null;
@@ -27,9 +21,10 @@ export interface AxisNow {
 /** Where a blade is comes with the axes of the turbine; of another axis its own objects tell. */
 export function useAxisNow(station: StationRef, context: DeviceContext | null): AxisNow {
   const blade = useAxes().get(station.blade ?? 0);
-  const position = useReading(context, POSITION, "fast");
-  const status = useReading(context, STATUSWORD, "fast");
-  useReading(context, VELOCITY, "fast");
+  const objects = objectsOf(context?.doc);
+  const position = useReading(context, objects.position, "fast");
+  const status = useReading(context, objects.statusword, "fast");
+  useReading(context, objects.velocity ?? "", "fast");
   if (station.blade !== null)
     return {
       position: blade?.position_deg ?? null,
@@ -39,9 +34,9 @@ export function useAxisNow(station: StationRef, context: DeviceContext | null): 
       ageMs: null,
     };
   return {
-    position: context && position ? scaledAt(context, POSITION) : null,
-    velocity: context && scaledAt(context, VELOCITY),
-    state: typeof status?.raw === "number" ? axisStateKey(status.raw) : null,
+    position: context && position ? scaledAt(context, objects.position) : null,
+    velocity: context && objects.velocity !== null ? scaledAt(context, objects.velocity) : null,
+    state: context && typeof status?.raw === "number" ? stateKeyOf(context.doc, status.raw) : null,
     stale: position?.stale ?? true,
     ageMs: position?.ageMs ?? null,
   };
@@ -61,7 +56,8 @@ function measureAt(context: DeviceContext | null, address: string): Measure {
 
 /** How targets and speeds of an axis are counted, by its description and the units that it has chosen. */
 export function measuresOf(context: DeviceContext | null): { position: Measure; speed: Measure } {
-  return { position: measureAt(context, TARGET), speed: measureAt(context, SPEED) };
+  const { target, speed } = objectsOf(context?.doc);
+  return { position: measureAt(context, target), speed: measureAt(context, speed) };
 }
 
 const TURN: Readonly<Record<string, number>> = { "°": 360, rev: 1 };

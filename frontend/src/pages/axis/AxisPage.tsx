@@ -7,6 +7,7 @@ import { entriesOf, useDeviceContext, useReading } from "../../ui/reading";
 import { measuresOf, useAxisNow } from "../../motion/axis";
 import { severityOf } from "../../model/axisState";
 import type { DeviceContext } from "../../model/shown";
+import { objectsOf } from "../../model/stateMachine";
 import { errorIn } from "./errorMemory";
 import { Routing } from "./Routing";
 import { age } from "../../ui/format";
@@ -76,6 +77,7 @@ function Axis({ station }: { station: StationRef }) {
   const faults = useFaults(contexts.pmc, blade?.faults);
   const [{ replay }] = usePageSearch();
   const name = drive?.name.toUpperCase() ?? "";
+  const objects = objectsOf(contexts.pmc?.doc);
   return (
     <div className={`${classes.panels} bench`}>
       {replay !== undefined ? (
@@ -85,7 +87,7 @@ function Axis({ station }: { station: StationRef }) {
       )}
       <section className={`${classes.panel} ${classes.plots}`} aria-label={t("page.axis.machine")}>
         <h2>{t("page.axis.machine")}</h2>
-        <StateDiagram state={now.state} stale={now.stale} />
+        <StateDiagram doc={contexts.pmc?.doc ?? null} state={now.state} stale={now.stale} />
       </section>
       <section className={`${classes.panel} ${classes.plots}`} aria-label={t("page.axis.plots")}>
         {station.blade !== null ? (
@@ -95,8 +97,18 @@ function Axis({ station }: { station: StationRef }) {
         )}
       </section>
       <Measurements {...contexts} />
-      <BitPanel title={t("page.axis.statusword")} context={contexts.pmc} address="6041" pace="fast" />
-      <BitPanel title={t("page.axis.controlword")} context={contexts.pmc} address="6040" pace="rare" />
+      <BitPanel
+        title={t("page.axis.statusword")}
+        context={contexts.pmc}
+        address={objects.statusword}
+        pace="fast"
+      />
+      <BitPanel
+        title={t("page.axis.controlword")}
+        context={contexts.pmc}
+        address={objects.controlword}
+        pace="rare"
+      />
       <BitPanel
         title={t("page.axis.inputs", { device: name })}
         context={contexts.pmc}
@@ -138,11 +150,13 @@ function useFaults(
   context: DeviceContext | null,
   ofBlade: AxisData["faults"] | undefined,
 ): AxisData["faults"] {
-  const reading = useReading(context, "603F", "slow");
-  const status = useReading(context, "6041", "fast");
+  const objects = objectsOf(context?.doc);
+  const reading = useReading(context, objects.errorCode, "slow");
+  const status = useReading(context, objects.statusword, "fast");
   if (ofBlade !== undefined || context === null) return ofBlade ?? [];
   const code = reading?.raw;
   if (typeof code !== "number" || code === 0) return [];
-  const severity = severityOf(typeof status?.raw === "number" ? status.raw : null);
+  const word = typeof status?.raw === "number" ? status.raw : null;
+  const severity = context.doc.state_machine ? "error" : severityOf(word);
   return [{ device: context.slug, code, text_key: errorIn(context.doc, code)?.text_key ?? null, severity }];
 }
