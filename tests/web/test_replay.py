@@ -42,6 +42,8 @@ REFUSED_IN_REPLAY = {
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/prepare"),
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/put-back"),
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/jog"),
+    ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/manual"),
+    ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/operation"),
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/move"),
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/home"),
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/search-home"),

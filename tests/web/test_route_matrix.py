@@ -71,6 +71,8 @@ ROUTES: Final[dict[tuple[str, str], Role]] = {
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/prepare"): TECHNICIAN,
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/put-back"): TECHNICIAN,
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/jog"): TECHNICIAN,
+    ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/manual"): TECHNICIAN,
+    ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/operation"): TECHNICIAN,
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/move"): TECHNICIAN,
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/home"): TECHNICIAN,
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/motion/search-home"): TECHNICIAN,

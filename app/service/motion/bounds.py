@@ -10,13 +10,14 @@ from collections.abc import Mapping
 from math import inf
 from typing import Final, NamedTuple
 
-from app.errors import AxisStateError, LimitError
+from app.errors import AxisStateError, LimitError, UsageError
 from app.model.address import Address
 from app.model.values import quantity_of
 from app.service.connection import Connection
 from app.service.devices import Target
 from app.service.motion.control import Control
 from app.service.motion.interlocks import POSITION, turns_blade
+from app.service.stop import is_cia402
 from app.service.write import know_what_it_rests_on
 
 TARGET_POSITION: Final = Address(0x607A)
@@ -45,7 +46,9 @@ def unit_of(target: Target, address: Address) -> str:
 
 
 def require_by_hand(connection: Connection, target: Target, speed: float) -> None:
-    """Raises LimitError for no speed at all, and where a blade would turn faster than by hand."""
+    """Raises LimitError for no speed at all, and where a blade would turn faster than by hand; UsageError."""
+    if not is_cia402(target):
+        raise UsageError(reason=f"{target.slug} has no such command: it is no axis of CiA 402")
     most, unit = inf, unit_of(target, TARGET_VELOCITY)
     if turns_blade(connection, target):
         per_s = _TURNS_PER_S.get(unit)

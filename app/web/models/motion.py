@@ -78,6 +78,28 @@ class JogRequest(OrderRequest):
     speed: Speed
 
 
+class ManualRequest(OrderRequest):
+    """Manual control of a hydraulic axis: to which side, by rapid or by creep."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"examples": [{"fence": 1764029382123456, "order": 2, "positive": True, "rapid": False}]}
+    )
+
+    positive: bool
+    rapid: bool
+
+
+class OperationRequest(OrderRequest):
+    """Whether both cylinders of a hydraulic axis go by themselves; ``aligned``: they stand at the same place."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"examples": [{"fence": 1764029382123456, "order": 2, "single": False, "aligned": True}]}
+    )
+
+    single: bool
+    aligned: bool
+
+
 class MoveRequest(OrderRequest):
     """Move the axis to a position while it is held."""
 

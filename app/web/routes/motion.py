@@ -11,13 +11,14 @@ from fastapi import APIRouter, Depends
 
 from app.errors import NotConnectedError, RoleError
 from app.model.roles import Role
-from app.service.motion import moves
+from app.service.motion import hydraulic_moves, moves, operation
 from app.service.motion.brake_test import try_brake
 from app.service.motion.desk import MotionDesk
 from app.service.motion.feathering import feather
 from app.service.motion.homing import search_home
 from app.service.motion.interlocks import Confirmed
 from app.service.motion.line import MotionLine, motion_line
+from app.service.motion.orders import orders_of
 from app.service.motion.positions import Positions, positions
 from app.web.deps import DEVICE, BenchOf, ConnectionOf, JournalOf, PersonOf, TargetOf, needs
 from app.web.models.motion import (
@@ -32,8 +33,10 @@ from app.web.models.motion import (
     JogRequest,
     LeaseDoc,
     LeaseRequest,
+    ManualRequest,
     MovedDoc,
     MoveRequest,
+    OperationRequest,
     OrderRequest,
     PreparedDoc,
     SearchHomeRequest,
@@ -144,11 +147,28 @@ async def jog(desk: DeskOf, target: TargetOf, journal: JournalOf, request: JogRe
     return _moved(desk)
 
 
+@router.post(MOTION + "/manual", dependencies=[TECHNICIAN])
+async def drive_by_hand(desk: DeskOf, target: TargetOf, request: ManualRequest) -> MovedDoc:
+    """Manual control of a hydraulic axis, at the speeds that the device holds for it, as long as it is held."""
+    desk.admit(request.fence, request.order)
+    way = hydraulic_moves.Way(request.positive, request.rapid)
+    await hydraulic_moves.drive_by_hand(desk, target.slug, request.fence, way)
+    return _moved(desk)
+
+
+@router.post(MOTION + "/operation", dependencies=[TECHNICIAN])
+async def take_over(desk: DeskOf, target: TargetOf, journal: JournalOf, request: OperationRequest) -> MovedDoc:
+    """Have the bus drive a hydraulic axis, its cylinders single or together; nothing moves by it."""
+    desk.admit(request.fence, request.order)
+    await operation.take_over(desk, target.slug, request.fence, request.single, request.aligned, journal)
+    return _moved(desk)
+
+
 @router.post(MOTION + "/move", dependencies=[TECHNICIAN])
 async def move(desk: DeskOf, target: TargetOf, journal: JournalOf, request: MoveRequest) -> MovedDoc:
     """Move the axis to a position as long as it is held."""
     desk.admit(request.fence, request.order)
-    await moves.move_to(desk, target.slug, request.fence, request.position, request.speed, journal)
+    await orders_of(target).move_to(desk, target.slug, request.fence, request.position, request.speed, journal)
     return _moved(desk)
 
 
@@ -172,7 +192,7 @@ async def find_home(desk: DeskOf, target: TargetOf, journal: JournalOf, request:
 async def reset(desk: DeskOf, target: TargetOf, journal: JournalOf, request: OrderRequest) -> MovedDoc:
     """Reset the fault of the axis; nothing moves by it."""
     desk.admit(request.fence, request.order)
-    await moves.reset_fault(desk, target.slug, request.fence, journal)
+    await orders_of(target).reset_fault(desk, target.slug, request.fence, journal)
     return _moved(desk)
 
 
@@ -180,7 +200,7 @@ async def reset(desk: DeskOf, target: TargetOf, journal: JournalOf, request: Ord
 async def hold(desk: DeskOf, target: TargetOf, request: OrderRequest) -> MovedDoc:
     """Have the axis enabled and standing, brake lifted, as long as it is held."""
     desk.admit(request.fence, request.order)
-    await moves.hold(desk, target.slug, request.fence)
+    await orders_of(target).hold(desk, target.slug, request.fence)
     return _moved(desk)
 
 

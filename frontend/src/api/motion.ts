@@ -55,6 +55,11 @@ export const moving = {
   /** Positions and speeds in the units of 607Ah and 60FFh: ° and °/s at a blade. */
   jog: (slug: string, order: Order, speed: number) =>
     send<Moved>("POST", `${axis(slug)}/jog`, { ...order, speed }),
+  /** Of a hydraulic axis: to which side, at one of the two speeds that it holds for it. */
+  manual: (slug: string, order: Order, positive: boolean, rapid: boolean) =>
+    send<Moved>("POST", `${axis(slug)}/manual`, { ...order, positive, rapid }),
+  operation: (slug: string, order: Order, single: boolean, aligned: boolean) =>
+    send<Moved>("POST", `${axis(slug)}/operation`, { ...order, single, aligned }),
   move: (slug: string, order: Order, position: number, speed: number) =>
     send<Moved>("POST", `${axis(slug)}/move`, { ...order, position, speed }),
   home: (slug: string, order: Order, position: number) =>

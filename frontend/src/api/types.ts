@@ -2,6 +2,7 @@
  * The types of the HTTP API and of the socket, under the names that the page uses. All but the description, which the
  * server sends as one document, are generated from the Python models. Times are Unix nanoseconds.
  */
+import type { StateMachine } from "../model/stateMachine";
 import type { components } from "./generated";
 
 type Schemas = components["schemas"];
@@ -153,6 +154,8 @@ export interface DescriptionDoc {
   bit_tables: Record<string, BitDoc[]>;
   enumerations: Record<string, EnumerationDoc>;
   errors: ErrorDoc[];
+  /** Null for the states of CiA 402, and for what is no axis. */
+  state_machine: StateMachine | null;
   entries: EntryDoc[];
   /** What makes RAM permanent; `category` null: all of it. */
   save: { address: string; category: string | null }[];

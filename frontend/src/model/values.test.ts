@@ -62,6 +62,7 @@ const DOC: DescriptionDoc = {
   save: [],
   variant_matches: [],
   sources: {},
+  state_machine: null,
 };
 
 const nothing: Lookup = () => null;

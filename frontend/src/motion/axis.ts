@@ -4,17 +4,11 @@ import { interlocksQuery } from "../api/motion";
 import type { StationRef } from "../api/types";
 import { useDerived, useHearing } from "../live/live";
 import type { LiveStore } from "../live/store";
-import { axisStateKey } from "../model/axisState";
 import type { DeviceContext } from "../model/shown";
+import { objectsOf, stateKeyOf } from "../model/stateMachine";
 import { quantityOf } from "../model/values";
 import { entriesOf, readingIn, readingTopics } from "../ui/reading";
 import { scaledAt } from "./drive";
-
-const POSITION = "6064";
-const VELOCITY = "606C";
-const STATUSWORD = "6041";
-const TARGET = "607A";
-const SPEED = "60FF";
 
 const REFRESH_MS = 1000;
 
@@ -39,7 +33,9 @@ export function useAxisNow<T>(
 ): T {
   const deaf = useHearing().state !== "hearing";
   const { blade } = station;
-  const topics = blade === null ? readingTopics(context, POSITION, STATUSWORD, VELOCITY) : ["axes"];
+  const { position, statusword, velocity } = objectsOf(context?.doc);
+  const topics =
+    blade === null ? readingTopics(context, position, statusword, velocity ?? position) : ["axes"];
   return useDerived(
     topics,
     (store) => pick(axisNowIn(store, station, context, deaf)),
@@ -69,13 +65,14 @@ function ofBlade(store: LiveStore, blade: number): AxisNow {
 }
 
 function ofDevice(store: LiveStore, context: DeviceContext | null, deaf: boolean): AxisNow {
-  const position = context && readingIn(store, context, POSITION, "fast", deaf);
-  const status = context?.lookup(STATUSWORD);
+  const objects = objectsOf(context?.doc);
+  const position = context && readingIn(store, context, objects.position, "fast", deaf);
+  const status = context?.lookup(objects.statusword);
   const stale = position?.stale ?? true;
   return {
-    position: context && position ? scaledAt(context, POSITION) : null,
-    velocity: context && scaledAt(context, VELOCITY),
-    state: typeof status === "number" ? axisStateKey(status) : null,
+    position: context && position ? scaledAt(context, objects.position) : null,
+    velocity: context && objects.velocity !== null ? scaledAt(context, objects.velocity) : null,
+    state: context && typeof status === "number" ? stateKeyOf(context.doc, status) : null,
     stale,
     ageMs: stale ? (position?.ageMs ?? null) : null,
   };
@@ -95,7 +92,8 @@ function measureAt(context: DeviceContext | null, address: string): Measure {
 
 /** How targets and speeds of an axis are counted, by its description and the units that it has chosen. */
 export function measuresOf(context: DeviceContext | null): { position: Measure; speed: Measure } {
-  return { position: measureAt(context, TARGET), speed: measureAt(context, SPEED) };
+  const { target, speed } = objectsOf(context?.doc);
+  return { position: measureAt(context, target), speed: measureAt(context, speed) };
 }
 
 const TURN: Readonly<Record<string, number>> = { "°": 360, rev: 1 };

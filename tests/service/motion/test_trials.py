@@ -14,6 +14,7 @@ from app.service.connection import Connection
 from app.service.motion.brake_test import OUTPUTS, BrakeVerdict, try_brake
 from app.service.motion.desk import MotionDesk
 from app.service.motion.feathering import feather
+from app.service.motion.control import cia402
 from app.service.motion.moves import hold, home, jog, move_to, reset_fault
 from app.service.motion.running import Ended
 from app.service.stop import Command, command_all
@@ -182,7 +183,7 @@ async def test_a_frame_that_the_adapter_does_not_take_keeps_nothing_from_stoppin
     async with at_the_desk(connection) as (desk, page):
         await prepared(desk, page)
         await out_of_feather(connection, desk, page)
-        control = desk.prepared[AXIS].control
+        control = cia402(desk.prepared[AXIS].control)
         send = control._send
         assert send is not None
         moving = asyncio.create_task(jog(desk, AXIS, page.fence, -4.0, connection.journal))

@@ -7,6 +7,7 @@ import { entriesOf, useDeviceContext } from "../../ui/reading";
 import { measuresOf, useAxisNow } from "../../motion/axis";
 import { severityOf } from "../../model/axisState";
 import type { DeviceContext } from "../../model/shown";
+import { objectsOf } from "../../model/stateMachine";
 import { errorIn } from "./errorMemory";
 import { Routing } from "./Routing";
 import { age } from "../../ui/format";
@@ -20,9 +21,6 @@ import { MotionPanel } from "./MotionPanel";
 import { BladePlots, DevicePlots } from "./Plots";
 import { RecordedNote } from "./RecordedNote";
 import { StateDiagram } from "./StateDiagram";
-
-const STATUSWORD = "6041";
-const ERROR_CODE = "603F";
 
 /** One axis in full: its state machine, what it measures, its inputs and outputs, and what moves it. */
 export function AxisPage() {
@@ -94,6 +92,7 @@ function Axis({ station }: { station: StationRef }) {
   const faults = useFaults(station, contexts.pmc);
   const [{ replay }] = usePageSearch();
   const name = drive?.name.toUpperCase() ?? "";
+  const objects = objectsOf(contexts.pmc?.doc);
   return (
     <div className={`${classes.panels} bench`}>
       {replay !== undefined ? (
@@ -113,8 +112,18 @@ function Axis({ station }: { station: StationRef }) {
         )}
       </section>
       <Measurements {...contexts} />
-      <BitPanel title={t("page.axis.statusword")} context={contexts.pmc} address="6041" pace="fast" />
-      <BitPanel title={t("page.axis.controlword")} context={contexts.pmc} address="6040" pace="rare" />
+      <BitPanel
+        title={t("page.axis.statusword")}
+        context={contexts.pmc}
+        address={objects.statusword}
+        pace="fast"
+      />
+      <BitPanel
+        title={t("page.axis.controlword")}
+        context={contexts.pmc}
+        address={objects.controlword}
+        pace="rare"
+      />
       <BitPanel
         title={t("page.axis.inputs", { device: name })}
         context={contexts.pmc}
@@ -153,23 +162,28 @@ function Axis({ station }: { station: StationRef }) {
 
 function StateNow({ station, context }: NowProps) {
   const { state, stale } = useAxisNow(station, context, (now) => ({ state: now.state, stale: now.stale }));
-  return <StateDiagram state={state} stale={stale} />;
+  return <StateDiagram doc={context?.doc ?? null} state={state} stale={stale} />;
 }
 
 /** Those of a blade come with it; of another axis its error code and its statusword tell. */
 function useFaults(station: StationRef, context: DeviceContext | null): AxisData["faults"] {
+  const objects = objectsOf(context?.doc);
   const ofBlade = useAxis(station.blade ?? 0, (axis) => axis?.faults);
   const ofDevice = useDerived(
-    context === null ? [] : [ERROR_CODE, STATUSWORD].map((address) => `value:${context.slug}/${address}`),
+    context === null
+      ? []
+      : [objects.errorCode, objects.statusword].map((address) => `value:${context.slug}/${address}`),
     () => (context === null || ofBlade !== undefined ? [] : faultsOf(context)),
   );
   return ofBlade ?? ofDevice;
 }
 
 function faultsOf(context: DeviceContext): AxisData["faults"] {
-  const code = context.lookup(ERROR_CODE);
-  const status = context.lookup(STATUSWORD);
+  const { errorCode, statusword } = objectsOf(context.doc);
+  const code = context.lookup(errorCode);
+  const status = context.lookup(statusword);
   if (typeof code !== "number" || code === 0) return [];
-  const severity = severityOf(typeof status === "number" ? status : null);
+  const word = typeof status === "number" ? status : null;
+  const severity = context.doc.state_machine ? "error" : severityOf(word);
   return [{ device: context.slug, code, text_key: errorIn(context.doc, code)?.text_key ?? null, severity }];
 }

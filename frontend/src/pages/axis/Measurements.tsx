@@ -20,6 +20,10 @@ const MOTION: readonly { key: string; address: string; pace: Pace }[] = [
   { key: "current", address: "6078", pace: "slow" },
   { key: "torque", address: "6077", pace: "slow" },
   { key: "dc_link", address: "6079", pace: "slow" },
+  { key: "mode", address: "0/40", pace: "slow" },
+  { key: "position", address: "12/100", pace: "fast" },
+  { key: "target", address: "12/21", pace: "rare" },
+  { key: "following_error", address: "12/103", pace: "slow" },
 ];
 const CURRENT = "6078";
 const TORQUE = "6077";

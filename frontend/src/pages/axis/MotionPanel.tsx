@@ -11,6 +11,8 @@ import classes from "./Axis.module.css";
 import { ControlSection } from "./ControlSection";
 import { EndSection } from "./EndSection";
 import { HomeSection } from "./HomeSection";
+import { HydraulicMoves } from "./HydraulicMoves";
+import { HydraulicOperation } from "./HydraulicOperation";
 import { Interlocks } from "./Interlocks";
 import { MoveSection } from "./MoveSection";
 import { PrepareSection } from "./PrepareSection";
@@ -37,8 +39,10 @@ export function MotionPanel({ station, device, context }: Props) {
   if (state === Control.None) return null;
   const blade = station.blade !== null;
   const has = (address: string) => context !== null && entriesOf(context.doc).has(address);
+  const hydraulic = context?.doc.state_machine?.profile === "dsp408";
   // Words of a blade for what turns one.
-  const words = (key: string) => t(blade ? `page.motion.${key}` : `page.motion.axis_${key}`);
+  const words = (key: string) =>
+    t(hydraulic ? `page.hydraulic.${key}` : blade ? `page.motion.${key}` : `page.motion.axis_${key}`);
   const lost = unwatched && line?.ended?.device === device.slug && line.ended.why === "link";
   return (
     <section className={`${classes.panel} ${classes.wide}`} aria-label={words("title")} data-testid="motion">
@@ -52,15 +56,24 @@ export function MotionPanel({ station, device, context }: Props) {
         <ControlSection device={device.slug} />
         <Interlocks device={device.slug} title={words("interlocks")} />
         <PrepareSection device={device.slug} />
-        <MoveSection station={station} device={device.slug} context={context} />
-        <TrySection device={device.slug} context={context} />
-        {searches(context) ? (
-          <SearchHomeSection device={device.slug} context={context} />
+        {hydraulic ? (
+          <>
+            <HydraulicMoves station={station} device={device.slug} context={context} />
+            <HydraulicOperation device={device.slug} context={context} />
+          </>
         ) : (
-          <HomeSection device={device.slug} />
+          <>
+            <MoveSection station={station} device={device.slug} context={context} />
+            <TrySection device={device.slug} context={context} />
+            {searches(context) ? (
+              <SearchHomeSection device={device.slug} context={context} />
+            ) : (
+              <HomeSection device={device.slug} />
+            )}
+          </>
         )}
         <EndSection device={device.slug} title={words("end")} />
-        {has(POSITION_GAIN) ? (
+        {hydraulic ? null : has(POSITION_GAIN) ? (
           <SignalSection device={device.slug} />
         ) : (
           context && <p className="dim">{t("page.motion.no_signals")}</p>

@@ -1,42 +1,32 @@
+import { useMemo } from "react";
+import type { DescriptionDoc } from "../../api/types";
 import { useTexts } from "../../texts/texts";
 import classes from "./Axis.module.css";
-import { commandsFrom, type Transition, TRANSITIONS, WORDS } from "./transitions";
+import { type Arrow as ArrowView, CIA_402_VIEW, commandsFrom, HEIGHT, viewOf, WIDTH } from "./machineView";
 
-interface Box {
-  name: string;
-  x: number;
-  y: number;
+interface Props {
+  /** Null until it is there. */
+  doc: DescriptionDoc | null;
+  state: string | null;
+  stale: boolean;
 }
 
-const WIDTH = 156;
-const HEIGHT = 36;
-const LEFT = 2;
-const RIGHT = 250;
-
-/** The states of CiA 402 in the arrangement of the standard: power off above, operation below, faults to the right. */
-const BOXES: readonly Box[] = [
-  { name: "not_ready_to_switch_on", x: LEFT, y: 4 },
-  { name: "switch_on_disabled", x: LEFT, y: 76 },
-  { name: "ready_to_switch_on", x: LEFT, y: 148 },
-  { name: "switched_on", x: LEFT, y: 220 },
-  { name: "operation_enabled", x: LEFT, y: 292 },
-  { name: "quick_stop_active", x: RIGHT, y: 220 },
-  { name: "fault", x: RIGHT, y: 76 },
-  { name: "fault_reaction_active", x: RIGHT, y: 4 },
-];
+/** Transitions are counted; some manuals put letters before the number. */
+const shortOf = (name: string) => name.replace(/^\D+/, "");
 
 /** The state machine of an axis: where it is, and on the arrows what can be commanded from there. */
-export function StateDiagram({ state, stale }: { state: string | null; stale: boolean }) {
+export function StateDiagram({ doc, state, stale }: Props) {
   const t = useTexts();
+  const view = useMemo(() => (doc?.state_machine ? viewOf(doc.state_machine) : CIA_402_VIEW), [doc]);
   const current = state?.split(".").at(-1);
   const words = t("page.axis.machine_state", { state_key: state ?? "page.axis.state_unknown" });
-  const allowed = commandsFrom(stale ? undefined : current);
+  const allowed = commandsFrom(view, stale ? undefined : current);
   // What can be commanded is drawn last, over the lines that it crosses.
-  const arrows = TRANSITIONS.toSorted((a, b) => Number(allowed.includes(a)) - Number(allowed.includes(b)));
+  const arrows = view.arrows.toSorted((a, b) => Number(allowed.includes(a)) - Number(allowed.includes(b)));
   return (
     <div className={classes.machinePicture}>
       <svg
-        viewBox="0 0 410 350"
+        viewBox={`0 0 ${view.width} ${view.height}`}
         className={classes.machine}
         role="img"
         aria-label={words}
@@ -49,14 +39,14 @@ export function StateDiagram({ state, stale }: { state: string | null; stale: bo
           <Head id="arrow-lit" colour="var(--hs-accent)" />
         </defs>
         {arrows.map((one) => (
-          <Arrow key={one.number} transition={one} lit={allowed.includes(one)} />
+          <Arrow key={one.name} arrow={one} lit={allowed.includes(one)} />
         ))}
-        {BOXES.map(({ name, x, y }) => (
+        {view.boxes.map(({ name, textKey, x, y }) => (
           <g key={name} className={classes.stateBox} data-current={name === current} data-name={name}>
             <rect x={x} y={y} width={WIDTH} height={HEIGHT} rx={6} />
             <text x={x + WIDTH / 2} y={y + HEIGHT / 2 + 5}>
               {name === current ? "▸ " : ""}
-              {t(`axis_state.${name}`)}
+              {t(textKey)}
             </text>
           </g>
         ))}
@@ -65,13 +55,13 @@ export function StateDiagram({ state, stale }: { state: string | null; stale: bo
         <h3>{t("page.axis.allowed")}</h3>
         <ul className={classes.commands} data-testid="allowed-commands">
           {allowed.length === 0 && <li className="dim">{t("page.axis.allowed_none")}</li>}
-          {allowed.map(({ number, command, to }) => (
-            <li key={number}>
-              <span className={classes.number}>{number}</span>
+          {allowed.map(({ name, commandKey, word, toKey }) => (
+            <li key={name}>
+              <span className={classes.number}>{shortOf(name)}</span>
               <span>
-                <strong>{t(`command.${command ?? ""}`)}</strong> {command === null ? "" : WORDS[command]}
+                <strong>{t(commandKey ?? "")}</strong> {word}
               </span>
-              <span className="dim">→ {t(`axis_state.${to}`)}</span>
+              <span className="dim">→ {t(toKey)}</span>
             </li>
           ))}
         </ul>
@@ -97,13 +87,13 @@ function Head({ id, colour }: { id: string; colour: string }) {
   );
 }
 
-function Arrow({ transition, lit }: { transition: Transition; lit: boolean }) {
-  const { number, path, at, command } = transition;
+function Arrow({ arrow, lit }: { arrow: ArrowView; lit: boolean }) {
+  const { name, path, at, commandKey } = arrow;
   return (
-    <g className={classes.transition} data-lit={lit} data-own={command === null} data-number={number}>
+    <g className={classes.transition} data-lit={lit} data-own={commandKey === null} data-number={name}>
       <path d={path} markerEnd={`url(#${lit ? "arrow-lit" : "arrow"})`} />
       <text x={at[0]} y={at[1]}>
-        {number}
+        {shortOf(name)}
       </text>
     </g>
   );

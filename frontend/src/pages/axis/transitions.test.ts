@@ -1,7 +1,8 @@
 import { describe, expect, it } from "vitest";
-import { Command, commandsFrom, TRANSITIONS, WORDS } from "./transitions";
+import { CIA_402_VIEW, commandsFrom } from "./machineView";
+import { Command, TRANSITIONS, WORDS } from "./transitions";
 
-const numbers = (state: string) => commandsFrom(state).map((one) => one.number);
+const numbers = (state: string) => commandsFrom(CIA_402_VIEW, state).map((one) => Number(one.name));
 
 describe("the transitions of CiA 402", () => {
   it("are each there once", () => {
@@ -17,7 +18,7 @@ describe("the transitions of CiA 402", () => {
     expect(numbers("quick_stop_active")).toEqual([12, 16]);
     expect(numbers("fault")).toEqual([15]);
     expect(numbers("fault_reaction_active")).toEqual([]);
-    expect(commandsFrom(undefined)).toEqual([]);
+    expect(commandsFrom(CIA_402_VIEW, undefined)).toEqual([]);
   });
 
   it("are commanded by the controlwords of table 52", () => {

@@ -110,7 +110,3 @@ export const TRANSITIONS: readonly Transition[] = [
   { number: 13, from: null, to: REACTION, command: null, path: "M206 22 H247", at: [208, 15] },
   { number: 14, from: REACTION, to: FAULT, command: null, path: "M328 40 V73", at: [334, 62] },
 ];
-
-/** What can be commanded from a state. An EFC goes from every state but those of a fault that keeps the motor from running. */
-export const commandsFrom = (state: string | undefined): readonly Transition[] =>
-  TRANSITIONS.filter((one) => one.command !== null && one.from === state);
