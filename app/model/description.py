@@ -14,6 +14,7 @@ from typing import Final
 
 from app.errors import UnknownObjectError
 from app.model.address import Address, Addressing
+from app.model.cylinders import Cylinders
 from app.model.datatypes import DataType, Raw
 
 Lookup = Callable[[Address], Raw | None]
@@ -408,7 +409,10 @@ class Source:
 
 @dataclass(frozen=True)
 class Description:
-    """A device: all its entries in the order of their addresses, its tables and commands."""
+    """A device: all its entries in the order of their addresses, its tables and commands.
+
+    ``cylinders`` is None for what moves none.
+    """
 
     id: str
     version: str
@@ -428,6 +432,7 @@ class Description:
     variants: tuple[str, ...] = ()
     variant_details: Mapping[str, Variant] = field(default_factory=dict)
     sources: Mapping[str, Source] = field(default_factory=dict)
+    cylinders: Cylinders | None = None
 
     def __iter__(self) -> Iterator[Entry]:
         return iter(self.entries.values())

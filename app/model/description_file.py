@@ -17,6 +17,7 @@ from typing import Any, Final, TypeVar
 from app.errors import DescriptionError, UsageError
 from app.model.address import Address, Addressing, parse_address
 from app.model.bundled import bundled_folder
+from app.model.cylinders import Cylinders, read_cylinders
 from app.model.datatypes import DataType, Raw, encode_raw
 from app.model.description import (
     Access,
@@ -59,7 +60,7 @@ BUILTIN: Final = {
 
 _TOP_KEYS: Final = frozenset(
     "schema id version name vendor bus addressing manual match save load variant source unit_rule group bit_table "
-    "enumeration error object".split()
+    "enumeration error object cylinders".split()
 )
 _ERROR_KEYS: Final = frozenset(("code", "name", "reaction", "aid", "number", "origin"))
 _OWN_KEYS: Final = frozenset(("index", "ind", "pnu", "kind", "subs", "elements"))
@@ -175,6 +176,7 @@ class _Reader:
             variants=tuple(str(variant.get("id")) for variant in data.get("variant", ())),
             variant_details={one.id: one for one in self._tables("variant", _variant_detail)},
             sources={one.id: one for one in self._tables("source", _source)},
+            cylinders=self._cylinders(),
         )
         self._cross_check(description)
         return description
@@ -185,6 +187,15 @@ class _Reader:
                 yield read(table)
             except (_WrongError, UsageError, KeyError, TypeError, ValueError) as error:
                 self._say(self._lines.table(key, number), f"[[{key}]]: {_reason(error)}")
+
+    def _cylinders(self) -> Cylinders | None:
+        if "cylinders" not in self._data:
+            return None
+        try:
+            return read_cylinders(self._data["cylinders"])
+        except (UsageError, KeyError, TypeError, ValueError) as error:
+            self._say(self._lines.key("cylinders"), f"[cylinders]: {_reason(error)}")
+            return None
 
     def _entries(self) -> dict[Address, Entry]:
         found: dict[Address, Entry] = {}
@@ -307,6 +318,9 @@ class _Reader:
             for number, command in enumerate(commands):
                 if command.address not in description.entries:
                     self._say(self._lines.table(key, number), f"{key} address {command.address} is no object")
+        for address in () if description.cylinders is None else description.cylinders.references():
+            if address not in description.entries:
+                self._say(self._lines.key("cylinders"), f"[cylinders]: {address.short} is no object here")
         for key, origins in (
             ("bit_table", [table.origin for table in description.bit_tables.values()]),
             ("enumeration", [table.origin for table in description.enumerations.values()]),

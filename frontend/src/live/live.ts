@@ -84,6 +84,7 @@ export const useLink = () => useTopic("link", (store) => store.link);
 export const useNodes = () => useTopic("nodes", (store) => store.nodes);
 export const useAxes = () => useTopic("axes", (store) => store.axes);
 export const useRotor = () => useTopic("rotor", (store) => store.rotor);
+export const useCylinders = () => useTopic("cylinders", (store) => store.cylinders);
 export const useInstructor = () => useTopic("instructor", (store) => store.instructor);
 export const useEvents = () => useTopic("events", (store) => store.events);
 export const useLoadHistory = () => useTopic("link", (store) => store.loadHistory);
