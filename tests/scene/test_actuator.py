@@ -143,6 +143,6 @@ async def test_one_with_a_single_cylinder_follows_one_with_two_and_all_is_taken_
         await until(lambda: rod_of(viewer, FIRST) == pytest.approx(rod_at(0.5)[0]))
         scene.show_actuators([pose(CylinderPose(0.2, ENABLED))])
         await until(lambda: rod_of(viewer, FIRST) == pytest.approx(rod_at(0.2)[0]))
-        assert actuator.actuator_node(1) in viewer.removed
+        assert SECOND in viewer.removed
         scene.forget()
         await until(lambda: viewer.visible.get(actuator.actuator_node(1)) is False)

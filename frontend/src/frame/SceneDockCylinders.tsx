@@ -47,8 +47,8 @@ function CylinderLabel({ cylinder, number }: { cylinder: CylinderData; number: n
       {cylinder.limits !== null && (
         <span className={classes.state}>
           {t("page.cylinders.limits", {
-            low: length(t, cylinder.limits[0] ?? null, "", LENGTH_DIGITS),
-            high: length(t, cylinder.limits[1] ?? null, cylinder.unit, LENGTH_DIGITS),
+            low: length(t, cylinder.limits[0], "", LENGTH_DIGITS),
+            high: length(t, cylinder.limits[1], cylinder.unit, LENGTH_DIGITS),
           })}
         </span>
       )}
@@ -88,7 +88,10 @@ const together = (synchronous: boolean | null) =>
   synchronous === null ? "together_unknown" : synchronous ? "synchronous" : "single";
 
 /** What it complains of comes first; then what is not the present; then the state of the axis. */
-function stateOf(t: Translate, { look, state, fault_code, fault_text_key, position_t_ns }: CylinderData): string {
+function stateOf(
+  t: Translate,
+  { look, state, fault_code, fault_text_key, position_t_ns }: CylinderData,
+): string {
   if (fault_code) {
     const code = `${fault_code.toString(16).toUpperCase().padStart(4, "0")}h`;
     return fault_text_key === null ? code : `${code} ${t(fault_text_key)}`;
