@@ -1,4 +1,6 @@
-"""``hubside demo``: twins of three blades and of a servo drive in processes of their own, and the page on them.
+"""``hubside demo``: twins of three blades, a servo drive and two cylinders, and the page on them.
+
+The twins are processes of their own. Those of the cylinders are there where the extra ``profibus`` is.
 
 Imports little: the libraries of the page are loaded while the twins start.
 """
@@ -11,6 +13,7 @@ import json
 import subprocess
 import sys
 from collections.abc import Iterator
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Final
 
@@ -20,13 +23,15 @@ from app.errors import BusOpenError
 from app.settings import TWIN_PORT
 
 END_S: Final = 20.0
+EXTRA_PACKAGE: Final = "pyprofibus"
+"""What the extra brings."""
 SERVO_PORT: Final = 1502
 """Usual of the twin of the servo drive."""
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Register the command."""
-    parser = commands.add_parser("demo", help="twins of three blades and of a servo drive, and the page on them")
+    parser = commands.add_parser("demo", help="twins of three blades, a servo drive and two cylinders, and the page")
     parser.add_argument("--turnaround-ms", type=milliseconds, default=1.0, help="time a twin takes to answer")
     add_port(parser)
     parser.set_defaults(
@@ -49,13 +54,15 @@ def run(arguments: argparse.Namespace, output: Output) -> int:
     with contextlib.ExitStack() as running:
         blades = _Twins(running, "socketcand:127.0.0.1:{port}", TWIN_PORT, _blades(arguments, data / "twins"))
         servo = _Twins(running, "127.0.0.1:{port}", SERVO_PORT, _servo(data / "twins" / "pd4e"))
+        line = _Twins(running, "", 0, _cylinders(data / "twins" / "ed2")) if _speaks_profibus() else None
         from app.cli.control_client import ControlClient
         from app.cli.demo_site import FIRST, demo_site
         from app.cli.serve import serve_turbine
 
         started, at = blades.started(), str(servo.started()["address"])
         address, control = str(started["address"]), started["control"]
-        arguments.site, arguments.turbine = demo_site(data, address, at), FIRST
+        path = None if line is None else str(line.started()["path"])
+        arguments.site, arguments.turbine = demo_site(data, address, at, path), FIRST
         arguments.instructor = ControlClient(control["address"], control["token"], address)
         return serve_turbine(arguments, output)
 
@@ -70,8 +77,21 @@ def _servo(state: Path) -> list[str]:
     return ["pd4e", "--state", str(state), "--modbus"]
 
 
+def _cylinders(state: Path) -> list[str]:
+    state.mkdir(parents=True, exist_ok=True)
+    return ["ed2", "--state", str(state)]
+
+
+def _speaks_profibus() -> bool:
+    """Whether there is somebody to speak with the cylinders, and a pseudo terminal where they could answer."""
+    return find_spec(EXTRA_PACKAGE) is not None and find_spec("termios") is not None
+
+
 class _Twins:
-    """One process of twins, from now until ``running`` ends; on any port where the usual one is taken."""
+    """One process of twins, from now until ``running`` ends; on any port where the usual one is taken.
+
+    ``place`` is empty where they find one by themselves.
+    """
 
     def __init__(self, running: contextlib.ExitStack, place: str, port: int, what: list[str]) -> None:
         self._running = running
@@ -90,7 +110,8 @@ class _Twins:
         return said
 
     def _start(self, port: int) -> subprocess.Popen[str]:
-        return self._running.enter_context(_twins([*self._what, self._place.format(port=port)]))
+        place = [self._place.format(port=port)] if self._place else []
+        return self._running.enter_context(_twins([*self._what, *place]))
 
 
 @contextlib.contextmanager

@@ -1,4 +1,4 @@
-"""The demo's second turbine: a drive on Modbus TCP, chosen, read and left again, and what the page shows of it."""
+"""The demo's other turbines, chosen, read and left again, and what the page shows of the drive on Modbus TCP."""
 
 from __future__ import annotations
 
@@ -24,6 +24,7 @@ pytestmark = [pytest.mark.timeout(240)]
 BENCH = "bench-pd4e"
 SERVO = f"{BENCH}/bench/servo"
 USUAL_PORT = 1502
+LINE_BENCH = "bench-ed2"
 expect.set_options(timeout=20_000)
 
 
@@ -74,7 +75,7 @@ def test_one_turbine_after_the_other(tmp_path: Path) -> None:
         page = stack.enter_context(httpx.Client(base_url=demo.home, follow_redirects=True, timeout=30))
         assert page.get(f"?{demo.url.partition('?')[2]}").status_code == 200
         known = {one["slug"]: one["connected"] for one in page.get("api/turbines").json()}
-        assert known == {"wtg-07": True, BENCH: False}, "the blades are connected at first"
+        assert known == {"wtg-07": True, BENCH: False, LINE_BENCH: False}, "the blades are connected at first"
         assert page.get("api/instructor").json()["available"] is True
 
         assert page.post("api/live/connect", json={"turbine": BENCH}).status_code == 200
@@ -91,6 +92,34 @@ def test_one_turbine_after_the_other(tmp_path: Path) -> None:
         assert page.post("api/live/connect", json={"turbine": "wtg-07"}).status_code == 200
         until(page, "api/live/turbine", lambda shown: shown["slug"] == "wtg-07" and shown["mode"] == "twin")
         assert page.get("api/instructor").json()["available"] is True
+
+
+def test_the_cylinders_are_connected_and_read(tmp_path: Path) -> None:
+    with started(tmp_path) as demo, httpx.Client(base_url=demo.home, follow_redirects=True, timeout=30) as page:
+        page.get(f"?{demo.url.partition('?')[2]}")
+        assert page.post("api/live/connect", json={"turbine": LINE_BENCH}).status_code == 200
+        turbine = until(page, "api/live/turbine", lambda shown: shown["slug"] == LINE_BENCH)
+        assert turbine["bus"]["interface"].startswith("profibus:/dev/")
+        device = f"{LINE_BENCH}/bench/cylinders"
+        job = page.post(f"api/live/devices/{device}/read", json={"addresses": ["0/38", "12/61", "12/100"]}).json()
+        read = until(page, f"api/live/jobs/{job['id']}", lambda shown: shown["state"] != "running")
+        assert (read["state"], read["failed"]) == ("done", [])
+
+
+def test_where_the_extra_is_missing_the_cylinders_say_how_to_get_it(tmp_path: Path) -> None:
+    """An interpreter without pyprofibus: the demo runs, and only this turbine cannot be connected."""
+    without = tmp_path / "without"
+    without.mkdir()
+    (without / "sitecustomize.py").write_text("import sys\nsys.modules['pyprofibus'] = None\n", encoding="utf-8")
+    with running("demo", "--port", "0", "--data", str(tmp_path / "data"), "--json", PYTHONPATH=str(without)) as process:
+        url = json.loads(process.wait_for('"url"'))["url"]
+        with httpx.Client(base_url=url.partition("?")[0], follow_redirects=True, timeout=30) as page:
+            page.get(f"?{url.partition('?')[2]}")
+            until(page, "api/live/turbine", lambda shown: shown["slug"] == "wtg-07" and shown["mode"] == "twin")
+            assert LINE_BENCH in {one["slug"] for one in page.get("api/turbines").json()}
+            refused = page.post("api/live/connect", json={"turbine": LINE_BENCH})
+            assert refused.status_code >= 400
+            assert "pip install 'hubside[profibus]'" in refused.json()["text"]
 
 
 # -- in the page ----------------------------------------------------------------------

@@ -123,6 +123,23 @@ def test_a_capture_from_the_signals_to_the_files(scope: Page) -> None:
     page.get_by_test_id("axes-each").click()
     expect(plots).to_have_count(4)
 
+    # an axis of values that is set by hand, kept in the link, and automatic again
+    page.get_by_test_id("scale-unit °").click()
+    page.get_by_test_id("scale-low").fill("5")
+    page.get_by_test_id("scale-high").fill("-5")
+    expect(page.get_by_text("From must be below up to")).to_be_visible()
+    expect(page.get_by_test_id("scale-set")).to_be_disabled()
+    page.get_by_test_id("scale-low").fill("-40")
+    page.get_by_test_id("scale-high").fill("120")
+    page.get_by_test_id("scale-high").press("Enter")
+    expect(page.get_by_test_id("scale-unit °")).to_contain_text("fixed")
+    expect(page).to_have_url(re.compile(r"yscale=[^&]*-40\.\.120"))
+    page.reload()
+    page.get_by_test_id("scale-unit °").click()
+    expect(page.get_by_test_id("scale-high")).to_have_value(re.compile(r"^120"))
+    page.get_by_test_id("scale-auto").click()
+    expect(page).not_to_have_url(re.compile("yscale="))
+
     # zoom by dragging, by keyboard, and back
     box = page.get_by_test_id("scope-plots").bounding_box()
     assert box is not None

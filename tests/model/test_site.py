@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -11,6 +12,8 @@ from app.errors import SiteError
 from app.model.description import Bus
 from app.model.servers import Server, parse_range, parse_server
 from app.model.site import Turbine, load_site, read_site
+from app.model.slaves import TELEGRAMS, SlaveSetup
+from app.wire.profibus.telegrams import TELEGRAM_TYPES
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "docs" / "sites" / "example.toml"
 
@@ -121,3 +124,61 @@ def test_two_devices_have_no_address_in_common_and_a_can_bus_has_none() -> None:
         read_site(text.replace('"modbus-tcp"\nranges = ["192.168.2.11"]', '"socketcan:can0"'), "x")
     with pytest.raises(SiteError, match="is not for a bus"):
         read_site(text.replace("ranges", "bitrate = 500_000\nranges"), "x")
+
+
+LINE_SITE = """
+schema = 1
+[turbine.bench]
+[turbine.bench.bus.dp0]
+connection = "{connection}"
+{bus}
+[turbine.bench.station.bench.device]
+a = {{ description = "wandfluh-ed2", node = {node}{more} }}
+"""
+
+
+def line_site(
+    connection: str = "profibus:/dev/ttyUSB0", bus: str = "", node: int = 6, more: str = ""
+) -> tuple[Turbine, ...]:
+    return read_site(LINE_SITE.format(connection=connection, bus=bus, node=node, more=more), "bench.toml")
+
+
+def test_a_line_of_profibus_has_a_port_a_rate_and_a_master() -> None:
+    (turbine,) = line_site()
+    (bus,) = turbine.buses
+    assert (bus.kind, bus.bitrate, bus.master) == (Bus.PROFIBUS_DP, 500_000, 2)
+    assert turbine.devices[0].slave == SlaveSetup()
+    more = ', telegram = 101, pzd_order = "high-low", gsd = "own.gsd", modules = ["4 words", "6 words"]'
+    (turbine,) = line_site(bus="bitrate = 1_500_000\nmaster = 3", node=126, more=more)
+    assert (turbine.buses[0].bitrate, turbine.buses[0].master) == (1_500_000, 3)
+    assert turbine.devices[0].slave == SlaveSetup(101, "high-low", "own.gsd", ("4 words", "6 words"))
+
+
+@pytest.mark.parametrize(
+    ("given", "key", "reason"),
+    [
+        ({"connection": "profibus:"}, "bus.dp0.connection", "names no serial port"),
+        ({"connection": "profibus:/dev/ttyUSB0@500000"}, "bus.dp0.connection", "the bit rate is a key of its own"),
+        ({"bus": "bitrate = 250_000"}, "bus.dp0.bitrate", "is 250000; PROFIBUS has 9600"),
+        ({"bus": "master = 127"}, "bus.dp0.master", "is 127, not 1 to 126"),
+        ({"bus": 'ranges = ["127.0.0.1"]'}, "bus.dp0.ranges", "is not for a bus"),
+        ({"bus": "heartbeat_node = 3"}, "bus.dp0.heartbeat_node", "is not for a bus"),
+        ({"node": 127}, "device.a.node", "is 127, not 1 to 126"),
+        ({"node": 2}, "bench/bench/a.node", "node 2 is already turbine.bench.bus.dp0"),
+        ({"more": ", telegram = 3"}, "device.a.telegram", "is 3; there are 1, 2, 100"),
+        ({"more": ', pzd_order = "big"'}, "device.a.pzd_order", "is 'big'; there are low-low"),
+        ({"more": ', gsd = "own.gsd"'}, "device.a.modules", "is missing"),
+        ({"more": ', modules = ["a"]'}, "device.a.gsd", "is missing"),
+        ({"more": ", modules = [1]"}, "device.a.modules", "is no list of names"),
+        ({"connection": "socketcan:can0", "more": ", telegram = 1"}, "device.a.telegram", "is for a bus with"),
+        ({"connection": "socketcan:can0", "bus": "master = 1"}, "bus.dp0.master", "is for a bus with"),
+    ],
+)
+def test_what_is_wrong_about_a_line_names_its_key(given: dict[str, Any], key: str, reason: str) -> None:
+    with pytest.raises(SiteError, match=reason) as refused:
+        line_site(**given)
+    assert str(refused.value.details["key"]).endswith(key)
+
+
+def test_the_types_of_telegrams_of_a_site_are_those_of_the_wire() -> None:
+    assert set(TELEGRAMS) == set(TELEGRAM_TYPES)

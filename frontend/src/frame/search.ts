@@ -120,6 +120,8 @@ export interface PageSearch {
   measure?: string;
   refs?: string;
   axes?: string;
+  /** Axes of values that were set by hand (pages/axis/scope/scales.ts). */
+  yscale?: string;
   /** Its stretch in view and its two cursors, in s since the trigger ("-0.5..1.5"). */
   zoom?: string;
   cursors?: string;
@@ -193,6 +195,7 @@ const TEXTS = [
   "measure",
   "refs",
   "axes",
+  "yscale",
   "zoom",
   "cursors",
   "spectrum",

@@ -1,6 +1,7 @@
 import { spanAt } from "../../../model/tracks";
 import { useTexts } from "../../../texts/texts";
 import classes from "./Scope.module.css";
+import { ScaleSetting } from "./ScaleSetting";
 import { Swatch } from "./Swatch";
 import { BITS, numberText, type PlotGroup, spanText, type Trace, valueAt } from "./traces";
 import type { Pair } from "./view";
@@ -11,15 +12,18 @@ interface Props {
   hoverS: number | null;
   /** All that is shown is of one device: its name need not be said again and again. */
   alone: boolean;
+  scale: Pair | null;
+  shown: () => Pair;
+  onScale: (scale: Pair | null) => void;
 }
 
 /** Above a plot: its unit, and of each signal in it the value at the pointer, or at both cursors and their difference. */
-export function PlotHead({ group, cursors, hoverS, alone }: Props) {
+export function PlotHead({ group, cursors, hoverS, alone, ...scale }: Props) {
   const t = useTexts();
   if (group.key === BITS) return <p className={classes.plotHead}>{t("page.scope.plot_bits")}</p>;
   return (
     <div className={`${classes.plotHead} bench`}>
-      <b>{group.unit === "" ? t("page.scope.plot_numbers") : group.unit}</b>
+      <ScaleSetting group={group} {...scale} />
       {group.traces
         .filter((one) => one.reference === null)
         .map((trace) => (

@@ -26,6 +26,8 @@ const DOT_PX = 2.2;
 interface Props {
   group: PlotGroup;
   view: Pair;
+  /** Limits of the axis that were set by hand. */
+  scale: Pair | null;
   endS: number;
   width: number;
   marks: readonly { atS: number; what: KeptMark["what"] }[];
@@ -36,7 +38,7 @@ interface Props {
 }
 
 /** The signals of one unit, or bits in lanes. Between two values the last one holds: nothing is drawn that was not seen. */
-export function ScopePlot({ group, view, endS, width, marks, label, last, onMade }: Props) {
+export function ScopePlot({ group, view, scale, endS, width, marks, label, last, onMade }: Props) {
   const t = useTexts();
   const scheme = useComputedColorScheme();
   const holder = useRef<HTMLDivElement>(null);
@@ -44,7 +46,7 @@ export function ScopePlot({ group, view, endS, width, marks, label, last, onMade
   const scene = useRef<Props | null>(null);
   const { key } = group;
   useEffect(() => {
-    scene.current = { group, view, endS, width, marks, label, last, onMade };
+    scene.current = { group, view, scale, endS, width, marks, label, last, onMade };
     if (drawn.current) rescale(drawn.current, scene.current);
   });
   useEffect(() => {
@@ -87,8 +89,8 @@ export function ScopePlot({ group, view, endS, width, marks, label, last, onMade
   );
 }
 
-function rescale(made: UPlot, { group, view }: Props): void {
-  const [min, max] = limitsOf(group, view[0], view[1]);
+function rescale(made: UPlot, { group, view, scale }: Props): void {
+  const [min, max] = scale ?? limitsOf(group, view[0], view[1]);
   made.batch(() => {
     made.setScale("x", { min: view[0], max: view[1] });
     made.setScale("y", { min, max });

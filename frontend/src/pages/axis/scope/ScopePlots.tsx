@@ -4,16 +4,19 @@ import {
   type PointerEvent,
   useCallback,
   useEffect,
+  useMemo,
   useRef,
   useState,
 } from "react";
 import type UPlot from "uplot";
 import type { KeptMark } from "../../../api/scope";
+import { usePageSearch } from "../../../frame/search";
 import { useTexts } from "../../../texts/texts";
 import { PlotHead } from "./PlotHead";
 import classes from "./Scope.module.css";
 import { LEFT_PX, RIGHT_PX, ScopePlot } from "./ScopePlot";
-import { BITS, type PlotGroup, secondsText } from "./traces";
+import { parseScales, scalesText, withScale } from "./scales";
+import { BITS, limitsOf, type PlotGroup, secondsText } from "./traces";
 import { moved, type Pair, within, zoomed } from "./view";
 
 const ZOOM_KEY = 0.5;
@@ -44,6 +47,8 @@ interface Props {
 export function ScopePlots(props: Props) {
   const { groups, whole, view, endS, marks, cursors, still, hoverS, drawn } = props;
   const t = useTexts();
+  const [search, update] = usePageSearch();
+  const scales = useMemo(() => parseScales(search.yscale), [search.yscale]);
   const stack = useRef<HTMLDivElement>(null);
   const width = useWidth(stack);
   const area = Math.max(1, width - LEFT_PX - RIGHT_PX);
@@ -137,10 +142,18 @@ export function ScopePlots(props: Props) {
     >
       {groups.map((group, at) => (
         <Fragment key={group.key}>
-          <PlotHead {...{ group, alone }} hoverS={still ? hoverS : (hoverS ?? 0)} cursors={shown} />
+          <PlotHead
+            {...{ group, alone }}
+            hoverS={still ? hoverS : (hoverS ?? 0)}
+            cursors={shown}
+            scale={scales.get(group.key) ?? null}
+            shown={() => limitsOf(group, view[0], view[1])}
+            onScale={(pair) => update({ yscale: scalesText(withScale(scales, group.key, pair)) })}
+          />
           <ScopePlot
             group={group}
             view={view}
+            scale={scales.get(group.key) ?? null}
             endS={endS}
             width={width}
             marks={marks}
