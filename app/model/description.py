@@ -15,6 +15,7 @@ from typing import Final
 from app.errors import UnknownObjectError
 from app.model.address import Address, Addressing
 from app.model.cylinders import Cylinders
+from app.model.axis_machine import StateMachine, machine_of
 from app.model.datatypes import DataType, Raw
 
 Lookup = Callable[[Address], Raw | None]
@@ -433,9 +434,16 @@ class Description:
     variant_details: Mapping[str, Variant] = field(default_factory=dict)
     sources: Mapping[str, Source] = field(default_factory=dict)
     cylinders: Cylinders | None = None
+    state_machine: StateMachine | None = None
+    """Of an axis that has another one than CiA 402: see ``machine``."""
 
     def __iter__(self) -> Iterator[Entry]:
         return iter(self.entries.values())
+
+    @property
+    def machine(self) -> StateMachine | None:
+        """The state machine by which it is commanded; None where it is no axis."""
+        return machine_of(self.entries, self.state_machine)
 
     def entry(self, address: Address) -> Entry:
         """The entry at ``address``. Raises UnknownObjectError."""

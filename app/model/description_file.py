@@ -16,6 +16,7 @@ from typing import Any, Final, TypeVar
 
 from app.errors import DescriptionError, UsageError
 from app.model.address import Address, Addressing, parse_address
+from app.model.axis_machine import StateMachine
 from app.model.bundled import bundled_folder
 from app.model.cylinders import Cylinders, read_cylinders
 from app.model.datatypes import DataType, Raw, encode_raw
@@ -48,6 +49,7 @@ from app.model.description import (
     VariantValues,
     Verify,
 )
+from app.model.description_machine import machine_state, machine_transition, state_machine
 from app.model.toml_lines import TomlLines
 
 SCHEMA: Final = 1
@@ -60,7 +62,7 @@ BUILTIN: Final = {
 
 _TOP_KEYS: Final = frozenset(
     "schema id version name vendor bus addressing manual match save load variant source unit_rule group bit_table "
-    "enumeration error object cylinders".split()
+    "enumeration error object state_machine state transition cylinders".split()
 )
 _ERROR_KEYS: Final = frozenset(("code", "name", "reaction", "aid", "number", "origin"))
 _OWN_KEYS: Final = frozenset(("index", "ind", "pnu", "kind", "subs", "elements"))
@@ -177,6 +179,7 @@ class _Reader:
             variant_details={one.id: one for one in self._tables("variant", _variant_detail)},
             sources={one.id: one for one in self._tables("source", _source)},
             cylinders=self._cylinders(),
+            state_machine=self._state_machine(),
         )
         self._cross_check(description)
         return description
@@ -195,6 +198,19 @@ class _Reader:
             return read_cylinders(self._data["cylinders"])
         except (UsageError, KeyError, TypeError, ValueError) as error:
             self._say(self._lines.key("cylinders"), f"[cylinders]: {_reason(error)}")
+            return None
+
+    def _state_machine(self) -> StateMachine | None:
+        head = self._data.get("state_machine")
+        if head is None:
+            return None
+        profile = str(head.get("profile"))
+        states = tuple(self._tables("state", lambda table: machine_state(table, profile)))
+        transitions = tuple(self._tables("transition", lambda table: machine_transition(table, profile, states)))
+        try:
+            return state_machine(head, profile, states, transitions)
+        except (UsageError, KeyError, TypeError, ValueError) as error:
+            self._say(self._lines.key("state_machine"), f"[state_machine]: {_reason(error)}")
             return None
 
     def _entries(self) -> dict[Address, Entry]:
@@ -311,6 +327,10 @@ class _Reader:
         return self._unit_rules[value]
 
     def _cross_check(self, description: Description) -> None:
+        machine = description.state_machine
+        for address in () if machine is None else (machine.controlword, machine.statusword):
+            if address not in description.entries:
+                self._say(self._lines.key("state_machine"), f"{address.short} of the state machine is no object")
         for entry in description:
             for reason in _contradictions(description, entry):
                 self._say(entry.line, f"{entry.address.short}: {reason}")

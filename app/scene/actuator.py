@@ -1,4 +1,4 @@
-"""The nodes of hydraulic cylinders and of the blades that they turn: rods at their places, setpoints, limits, states."""
+"""The nodes of hydraulic cylinders and of the blades that they turn: rods, setpoints, limits, states."""
 
 from __future__ import annotations
 
@@ -19,12 +19,13 @@ MOST: Final = 3
 """Blades of one rotor."""
 APART_M: Final = 40.0
 """So far that a camera before one sees no other."""
-LABELS_M: Final[tuple[Vector, ...]] = ((0.6, 1.0, -1.05), (0.6, -1.0, 1.05))
+LABELS_M: Final[tuple[Vector, ...]] = ((0.6, 0.95, -1.75), (0.6, -0.95, 1.45))
 """Places of the cylinders' labels."""
-BLADE_LABEL_M: Final[Vector] = (0.3, 0.0, 0.0)
+BLADE_LABEL_M: Final[Vector] = (0.3, 0.95, 1.95)
 _STEEL: Final[Rgb] = (188, 196, 205)
-_CAST: Final[Rgb] = (98, 108, 119)
-_DARK: Final[Rgb] = (44, 52, 61)
+_CAST: Final[Rgb] = (112, 122, 133)
+_FRAME: Final[Rgb] = (86, 97, 109)
+_RAIL: Final[Rgb] = (60, 70, 81)
 _VALVE: Final[Rgb] = (58, 110, 165)
 _SCALE: Final[Rgb] = (245, 247, 250)
 _MARK: Final[Rgb] = (255, 120, 60)
@@ -76,7 +77,7 @@ class _Cylinder:
         self.frame = scene.add_frame(root, show_axes=False)
         self.barrel = _add(scene, f"{root}/barrel", parts.barrel(), BladeState.UNKNOWN.rgb)
         for name, mesh, colour in (
-            ("foot", parts.foot(), _CAST), ("valve", parts.valve(), _VALVE), ("rail", parts.rail(), _DARK),
+            ("foot", parts.foot(), _CAST), ("valve", parts.valve(), _VALVE), ("rail", parts.rail(), _RAIL),
             ("ticks", parts.ticks(), _SCALE),
         ):  # fmt: skip
             _add(scene, f"{root}/{name}", mesh, colour)
@@ -134,7 +135,7 @@ class _Actuator:
         root = actuator_node(number)
         self.count = count
         self.frame = scene.add_frame(root, position=place_of(number), show_axes=False)
-        _add(scene, f"{root}/frame", parts.frame(count), _DARK)
+        _add(scene, f"{root}/frame", parts.frame(count), _FRAME)
         self.blade = scene.add_frame(f"{root}/blade", show_axes=False)
         _add(scene, f"{root}/blade/disc", parts.disc(), _STEEL)
         _add(scene, f"{root}/blade/mark", parts.mark(), _MARK)

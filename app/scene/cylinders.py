@@ -1,8 +1,8 @@
 """Hydraulic cylinders and the root of the blade that they turn, as meshes.
 
 Drawn several times their size beside the blade; proportions are usual ones, no maker's, and the linkage is that of
-``app.scene.linkage``. The pitch axis points along +x, towards who looks; positive is counter-clockwise for him. A cylinder
-is made along +x from its foot, and turned to where it belongs.
+``app.scene.linkage``. The pitch axis points along +x, towards who looks; positive is counter-clockwise for him. A
+cylinder is made along +x from its foot, and turned to where it belongs.
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@ from itertools import cycle
 from typing import Final, Literal
 
 from app.model.address import Address
-from app.model.cylinders import MOST, Cylinders, CylinderState
+from app.model.cylinders import MOST, Cylinders
 from app.model.site import Turbine
 from app.model.values import to_scaled
 from app.scene import linkage
@@ -131,9 +131,10 @@ class _Seen:
         self.target = target
         self.roles = roles
         self._now_ns = now_ns
-        status = target.lookup(roles.status)
+        machine = target.description.machine
+        status = None if machine is None else target.lookup(machine.statusword)
         self._status = status if isinstance(status, int) else None
-        self._state: CylinderState | None = None if self._status is None else roles.state(self._status)
+        self._state = None if machine is None or self._status is None else machine.state_of(self._status)
         code = target.lookup(roles.error)
         self._code = code if isinstance(code, int) else None
         node = target.live.node(target.device.bus, target.node)
@@ -213,7 +214,7 @@ class _Seen:
 
     def _setpoint(self) -> float | None:
         """What is not known does not keep it from being shown: what is known to be otherwise does."""
-        if self._state is None or not self._state.moves:
+        if self._state is None or not self._state.runs:
             return None
         if any(condition.of(self.target.lookup) is False for condition in self.roles.follows):
             return None
@@ -237,10 +238,11 @@ class _Seen:
             return "fault"
         if self._code:
             return "warning"  # it stands for the sake of the other one
-        if self._state is None:
-            return "idle"
-        warns = self._status is not None and self._status & self.roles.warning
-        return "warning" if warns and self._state.look != "fault" else self._state.look  # type: ignore[return-value]
+        if self._state is not None and self._state.fault:
+            return "fault"
+        if self._status is not None and self._status & self.roles.warning:
+            return "warning"
+        return "enabled" if self._state is not None and self._state.powered else "idle"
 
 
 class _Stroke:

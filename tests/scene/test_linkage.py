@@ -25,8 +25,8 @@ def test_the_angle_follows_from_the_stroke_and_the_stroke_from_the_angle(extensi
 
 
 def test_the_shortest_is_longer_than_the_stroke_so_that_a_rod_fits_into_its_tube() -> None:
-    assert linkage.SHORTEST == pytest.approx(1.570197, abs=1e-6)
-    assert linkage.CRANK == pytest.approx(0.731925, abs=1e-6)
+    assert pytest.approx(1.570197, abs=1e-6) == linkage.SHORTEST
+    assert pytest.approx(0.731925, abs=1e-6) == linkage.CRANK
 
 
 def test_the_first_cylinder_stands_below_and_the_second_is_the_first_turned_by_half_a_turn() -> None:

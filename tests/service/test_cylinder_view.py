@@ -59,7 +59,7 @@ def line(seen: Seen, age_ns: int = 0, *, more: Seen | None = None, gone: bool = 
 def test_the_rod_is_where_it_was_seen_and_the_blade_where_the_linkage_has_it() -> None:
     first, second = line(HERE).cylinders
     assert (first.position, first.unit, first.extension, first.look) == (250.0, "mm", 0.5, "enabled")
-    assert first.state == "cylinder_state.active"
+    assert first.state == "dsp408_state.device_mode_active"
     assert line(HERE).angle_deg == pytest.approx(40.10)
     assert (second.position, second.extension, second.look) == (None, None, "unknown")
     assert line(HERE).deviation is None
