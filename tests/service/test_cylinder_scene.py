@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Iterator
-from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -17,7 +16,7 @@ from app.scene.actuator import cylinder_node, rod_at
 from app.scene.hub import BladeState, HubScene
 from app.scene.solids import quaternion
 from app.service.connection import Connection
-from app.service.cylinder_view import cylinder_lines
+from app.service.cylinder_view import CylindersLine, cylinder_lines
 from app.service.poll import Poller
 from app.service.replay.source import Source
 from app.service.replay.stage import ReplayStage
@@ -49,7 +48,7 @@ async def until(feed: SceneFeed, holds: Callable[[], bool]) -> None:
     """Step the picture until something holds."""
     loop = asyncio.get_running_loop()
     async with asyncio.timeout(DEADLINE_S):
-        while not (feed.step(loop.time()) and holds()):
+        while not (feed.step(loop.time()) and holds()):  # noqa: ASYNC110  what is waited for has no event
             await asyncio.sleep(0.03)
 
 
@@ -95,11 +94,15 @@ async def test_the_picture_follows_a_twin_that_moves_and_shows_its_fault(scene: 
             line.do(lambda: setattr(line.device.axes[0].transducer.wire, "broken", True))
             await until(feed, lambda: viewer.visible.get(f"{FIRST}/halo") is True)
             assert tuple(viewer.updates[f"{FIRST}/barrel"]["color"]) == BladeState.FAULT.rgb
-            (live,) = cylinder_lines(
-                connection.turbine, {target.slug: target for target in connection.targets}, connection.stamper()
-            )
-            with suppress(asyncio.CancelledError):
-                await poller.close()
+            targets = {target.slug: target for target in connection.targets}
+
+            def shown_live() -> CylindersLine:
+                (found,) = cylinder_lines(connection.turbine, targets, connection.stamper())
+                return found
+
+            await until(feed, lambda: shown_live().cylinders[0].fault_text_key is not None)
+            await poller.close()
+            live = shown_live()
             (file,) = connection.recorded_files()
     assert live.cylinders[0].fault_text_key == "error_code.ed2_transducer_wire_1"
     source = Source(file, {})
