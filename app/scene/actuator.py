@@ -19,7 +19,7 @@ MOST: Final = 3
 """Blades of one rotor."""
 APART_M: Final = 40.0
 """So far that a camera before one sees no other."""
-LABELS_M: Final[tuple[Vector, ...]] = ((0.6, 0.95, -1.75), (0.6, -0.95, 1.45))
+LABELS_M: Final[tuple[Vector, ...]] = ((0.6, 1.2, -1.8), (0.6, -0.95, 1.45))
 """Places of the cylinders' labels."""
 BLADE_LABEL_M: Final[Vector] = (0.3, 0.95, 1.95)
 _STEEL: Final[Rgb] = (188, 196, 205)

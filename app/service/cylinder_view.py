@@ -110,17 +110,17 @@ def _station_line(
 
 
 def _deviation(lines: list[CylinderLine]) -> float | None:
-    fresh = [line for line in lines if line.position is not None and line.look != "stale"]
-    if len(fresh) < MOST or fresh[0].unit != fresh[1].unit:
+    fresh = [line.position for line in lines if line.position is not None and line.look != "stale"]
+    if len(fresh) < MOST or lines[0].unit != lines[1].unit:
         return None
-    return round(fresh[0].position - fresh[1].position, 4)  # type: ignore[operator]  # both are known
+    return round(fresh[0] - fresh[1], 4)
 
 
 def _worst(lines: Iterable[CylinderLine]) -> LookName:
     looks = [line.look for line in lines]
     for one in ("unknown", "stale"):
         if one in looks:
-            return one  # type: ignore[return-value]  # both are looks
+            return one
     return max(looks, key=lambda look: _SEVERITY[look])
 
 

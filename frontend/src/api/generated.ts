@@ -5101,8 +5101,9 @@ export interface components {
          * @description One cylinder, ``number`` 1 or 2, of a station. Lengths are in ``unit``, which is empty where it is not known.
          *
          *     ``position`` None: no telegram carries it, or none was seen. ``setpoint`` is None while the rod follows none, and
-         *     ``limits`` where they do not count. ``extension``, ``setpoint_at`` and ``limits_at`` are the same as shares of the stroke
-         *     as drawn. ``state`` and ``fault_text_key`` are text keys; ``fault_code`` 0 is no fault of this cylinder, None unknown.
+         *     ``limits`` where they do not count. ``extension``, ``setpoint_at`` and ``limits_at`` are the same as shares of the
+         *     stroke as drawn. ``state`` and ``fault_text_key`` are text keys; ``fault_code`` is 0 where this cylinder has no
+         *     fault, None where that is not known.
          */
         CylinderLine: {
             /** Device */
@@ -10508,6 +10509,26 @@ export interface components {
             start_t_ns: number;
         };
         /**
+         * TraceFdl
+         * @description Of a PROFIBUS telegram: who speaks to whom, and the access points; None where it does not say.
+         *
+         *     ``pkw``: its data begin with PKW, the process data follow. ``sound``: it is a whole telegram without an error.
+         */
+        TraceFdl: {
+            /** Destination */
+            destination: number | null;
+            /** Dsap */
+            dsap: number | null;
+            /** Pkw */
+            pkw: boolean;
+            /** Sound */
+            sound: boolean;
+            /** Source */
+            source: number | null;
+            /** Ssap */
+            ssap: number | null;
+        };
+        /**
          * TraceFilter
          * @description Empty means any; all that is given must hold. ``id`` comes back with each answer.
          *
@@ -10599,7 +10620,8 @@ export interface components {
          * @description One frame, or a gap in the traffic. ``start_t_ns``: the first request of the transfer that this frame ended.
          *
          *     Of Modbus TCP ``transaction`` is set, ``peer`` is the client's end of the connection, ``number`` the function
-         *     code and ``dlc`` the bytes of the ADU; ``can_id`` is 0.
+         *     code and ``dlc`` the bytes of the ADU; ``can_id`` is 0. Of PROFIBUS ``fdl`` is set, and ``dlc`` is the bytes of the
+         *     telegram.
          */
         TraceLine: {
             /** Bus */
@@ -10619,6 +10641,7 @@ export interface components {
             dlc: number;
             /** Extended */
             extended: boolean;
+            fdl: components["schemas"]["TraceFdl"] | null;
             /** Items */
             items: components["schemas"]["TraceItem"][];
             /** Node */
