@@ -14,8 +14,8 @@ from typing import Final
 
 from app.errors import UnknownObjectError
 from app.model.address import Address, Addressing
-from app.model.cylinders import Cylinders
 from app.model.axis_machine import StateMachine, machine_of
+from app.model.cylinders import Cylinders
 from app.model.datatypes import DataType, Raw
 
 Lookup = Callable[[Address], Raw | None]
