@@ -56,7 +56,7 @@ BENCH: Final = Camera("shaft", (_X + 6.2, _Y - 3.6, _Z + 2.2), (_X - 0.3, _Y, _Z
 def _cylinder_camera(number: int) -> Camera:
     """From before the blade's root, a little aside, so that the blade is seen behind it."""
     x, y, z = actuator.place_of(number)
-    return Camera(f"cylinders-{number}", (x + 8.8, y - 4.8, z + 2.8), (x - 0.3, y - 0.1, z), (1.85, 2.15))
+    return Camera(f"cylinders-{number}", (x + 8.8, y - 4.8, z + 2.8), (x - 0.3, y - 0.2, z), (1.85, 2.15))
 
 
 CAMERAS: Final = (

@@ -29,7 +29,7 @@ _BORE_M: Final = 0.135
 _ROD_M: Final = 0.062
 _RAIL_M: Final = -0.27
 """Of the scale: beside the tube, on the side that looks away from the pitch axis."""
-_BLADE_SPAN: Final = 0.30
+_BLADE_SPAN: Final = 0.22
 """Share of its drawn length at which the blade is drawn behind its root."""
 
 

@@ -27,7 +27,7 @@ function CylinderLabel({ cylinder, number }: { cylinder: CylinderData; number: n
   const name = t("page.cylinders.name", { number: cylinder.number });
   return (
     <span
-      className={classes.label}
+      className={`${classes.label} ${classes.told}`}
       data-look={cylinder.look}
       data-place={`cylinder-${number}-${cylinder.number}`}
       data-blade={cylinder.number}
