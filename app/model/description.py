@@ -15,6 +15,7 @@ from typing import Final
 from app.errors import UnknownObjectError
 from app.model.address import Address, Addressing
 from app.model.axis_machine import StateMachine, machine_of
+from app.model.cylinders import Cylinders
 from app.model.datatypes import DataType, Raw
 
 Lookup = Callable[[Address], Raw | None]
@@ -409,7 +410,10 @@ class Source:
 
 @dataclass(frozen=True)
 class Description:
-    """A device: all its entries in the order of their addresses, its tables and commands."""
+    """A device: all its entries in the order of their addresses, its tables and commands.
+
+    ``cylinders`` is None for what moves none.
+    """
 
     id: str
     version: str
@@ -429,6 +433,7 @@ class Description:
     variants: tuple[str, ...] = ()
     variant_details: Mapping[str, Variant] = field(default_factory=dict)
     sources: Mapping[str, Source] = field(default_factory=dict)
+    cylinders: Cylinders | None = None
     state_machine: StateMachine | None = None
     """Of an axis that has another one than CiA 402: see ``machine``."""
 

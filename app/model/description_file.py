@@ -18,6 +18,7 @@ from app.errors import DescriptionError, UsageError
 from app.model.address import Address, Addressing, parse_address
 from app.model.axis_machine import StateMachine
 from app.model.bundled import bundled_folder
+from app.model.cylinders import Cylinders, read_cylinders
 from app.model.datatypes import DataType, Raw, encode_raw
 from app.model.description import (
     Access,
@@ -61,7 +62,7 @@ BUILTIN: Final = {
 
 _TOP_KEYS: Final = frozenset(
     "schema id version name vendor bus addressing manual match save load variant source unit_rule group bit_table "
-    "enumeration error object state_machine state transition".split()
+    "enumeration error object state_machine state transition cylinders".split()
 )
 _ERROR_KEYS: Final = frozenset(("code", "name", "reaction", "aid", "number", "origin"))
 _OWN_KEYS: Final = frozenset(("index", "ind", "pnu", "kind", "subs", "elements"))
@@ -177,6 +178,7 @@ class _Reader:
             variants=tuple(str(variant.get("id")) for variant in data.get("variant", ())),
             variant_details={one.id: one for one in self._tables("variant", _variant_detail)},
             sources={one.id: one for one in self._tables("source", _source)},
+            cylinders=self._cylinders(),
             state_machine=self._state_machine(),
         )
         self._cross_check(description)
@@ -188,6 +190,15 @@ class _Reader:
                 yield read(table)
             except (_WrongError, UsageError, KeyError, TypeError, ValueError) as error:
                 self._say(self._lines.table(key, number), f"[[{key}]]: {_reason(error)}")
+
+    def _cylinders(self) -> Cylinders | None:
+        if "cylinders" not in self._data:
+            return None
+        try:
+            return read_cylinders(self._data["cylinders"])
+        except (UsageError, KeyError, TypeError, ValueError) as error:
+            self._say(self._lines.key("cylinders"), f"[cylinders]: {_reason(error)}")
+            return None
 
     def _state_machine(self) -> StateMachine | None:
         head = self._data.get("state_machine")
@@ -327,6 +338,9 @@ class _Reader:
             for number, command in enumerate(commands):
                 if command.address not in description.entries:
                     self._say(self._lines.table(key, number), f"{key} address {command.address} is no object")
+        for address in () if description.cylinders is None else description.cylinders.references():
+            if address not in description.entries:
+                self._say(self._lines.key("cylinders"), f"[cylinders]: {address.short} is no object here")
         for key, origins in (
             ("bit_table", [table.origin for table in description.bit_tables.values()]),
             ("enumeration", [table.origin for table in description.enumerations.values()]),

@@ -133,6 +133,7 @@
         visible(selected, view.selected === blade),
         visible(demand, view.ghosts),
       ]),
+      ...SCENE.ghosts.map((name) => visible(name, view.ghosts)),
     ]);
   }
 

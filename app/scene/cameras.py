@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from typing import Final, NamedTuple
 
+from app.scene import actuator
 from app.scene.blade import TIP_M
 from app.scene.marks import COLLAR_M
 from app.scene.shaft import PLACE_M
@@ -51,7 +52,20 @@ _X, _Y, _Z = PLACE_M
 BENCH: Final = Camera("shaft", (_X + 6.2, _Y - 3.6, _Z + 2.2), (_X - 0.3, _Y, _Z + 0.1), (1.45, 1.35))
 """The axis on a bench: from before its shaft, a little aside, so that gear and motor are seen behind it."""
 
-CAMERAS: Final = (FRONT, HUB, *(_blade_camera(blade) for blade in (1, 2, 3)), BENCH)
+
+def _cylinder_camera(number: int) -> Camera:
+    """From before the blade's root, a little aside, so that the blade is seen behind it."""
+    x, y, z = actuator.place_of(number)
+    return Camera(f"cylinders-{number}", (x + 8.8, y - 4.8, z + 2.8), (x - 0.3, y - 0.2, z), (1.85, 2.15))
+
+
+CAMERAS: Final = (
+    FRONT,
+    HUB,
+    *(_blade_camera(blade) for blade in (1, 2, 3)),
+    BENCH,
+    *(_cylinder_camera(number) for number in range(1, actuator.MOST + 1)),
+)
 
 
 def fov_rad(camera: Camera, aspect: float) -> float:

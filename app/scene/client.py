@@ -7,6 +7,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
+from app.scene import actuator
 from app.scene.blade import ROOT_M, TIP_M
 from app.scene.cameras import CAMERAS, Camera
 from app.scene.hub import BLADES, NOSE, ROTOR, demand_node, selected_node
@@ -18,6 +19,9 @@ _HERE: Final = Path(__file__).parent
 _SHAFT: Final[Vector] = (1.0, 0.0, 0.0)
 _LABEL_M: Final = ROOT_M + (TIP_M - ROOT_M) * 0.97
 """Where along a blade its label belongs: at the tip, where it hides least."""
+
+
+_ACTUATORS: Final = range(1, actuator.MOST + 1)
 
 
 def bare_page(page: bytes) -> bytes:
@@ -42,7 +46,12 @@ def scene_facts() -> dict[str, Any]:
         "nose": NOSE,
         "cameras": [_camera(camera) for camera in CAMERAS],
         "blades": blades,
-        "places": [*(place for blade in BLADES for place in _places(blade)), *map(_shaft_place, range(1, MOST + 1))],
+        "ghosts": [actuator.setpoint_node(number, one) for number in _ACTUATORS for one in (1, 2)],
+        "places": [
+            *(place for blade in BLADES for place in _places(blade)),
+            *map(_shaft_place, range(1, MOST + 1)),
+            *(place for number in _ACTUATORS for place in _actuator_places(number)),
+        ],
     }
 
 
@@ -61,6 +70,16 @@ def _shaft_place(number: int) -> dict[str, Any]:
     """Where the label of an axis on the bench belongs: it does not turn with the rotor."""
     position = [round(one + more, 4) for one, more in zip(place_of(number), LABEL_M, strict=True)]
     return {"id": f"shaft-{number}", "position": position, "normal": None, "fixed": True}
+
+
+def _actuator_places(number: int) -> list[dict[str, Any]]:
+    """Where the labels of two cylinders and of what they turn belong."""
+    names = (*(f"cylinder-{number}-{one}" for one in (1, 2)), f"turned-{number}")
+    found = []
+    for name, more in zip(names, (*actuator.LABELS_M, actuator.BLADE_LABEL_M), strict=True):
+        position = [round(one + by, 4) for one, by in zip(actuator.place_of(number), more, strict=True)]
+        found.append({"id": name, "position": position, "normal": None, "fixed": True})
+    return found
 
 
 def _places(blade: int) -> list[dict[str, Any]]:

@@ -1,4 +1,4 @@
-"""The rotor as a scene: the latest angles of the live state, coloured by state, on a turning hub; or a bench's shafts.
+"""The rotor as a scene: the latest angles of the live state, coloured by state, on a turning hub; or what a bench has.
 
 Only what was seen on the wire moves anything; what is stale or unknown is shown as such (grey, seen through), never
 guessed. The scene is one for all viewers; what differs between them (camera, selection, nose, ghosts) each view sets
@@ -13,14 +13,34 @@ from typing import Any, Final
 import viser
 
 from app.scene import machinery, marks
+from app.scene.actuator import Actuators
 from app.scene.blade import PITCH_AXIS, ROOT_M, TIP_M, blade_mesh, root_radius_m
 from app.scene.cameras import FRONT, fov_rad
-from app.scene.look import UNKNOWN_BLADE, UNKNOWN_ROTOR, BladePose, BladeState, Rgb, RotorPose, ShaftPose
+from app.scene.look import (
+    UNKNOWN_BLADE,
+    UNKNOWN_ROTOR,
+    ActuatorPose,
+    BladePose,
+    BladeState,
+    CylinderPose,
+    Rgb,
+    RotorPose,
+    ShaftPose,
+)
 from app.scene.server import start_server
 from app.scene.shaft import Shafts
 from app.scene.solids import Mesh, quaternion, torus
 
-__all__ = ["BLADES", "BladePose", "BladeState", "HubScene", "RotorPose", "ShaftPose"]
+__all__ = [
+    "BLADES",
+    "ActuatorPose",
+    "BladePose",
+    "BladeState",
+    "CylinderPose",
+    "HubScene",
+    "RotorPose",
+    "ShaftPose",
+]
 
 BLADES: Final = (1, 2, 3)
 ROTOR: Final = "/rotor"
@@ -141,6 +161,7 @@ class HubScene:
         self._turbine = (self._rotor, nacelle, tower)
         self._has_rotor = True
         self._shafts = Shafts(scene)
+        self._actuators = Actuators(scene)
         self._wind = scene.add_frame("/wind", position=_WIND_AT_M, show_axes=False, visible=False)
         self._arrow = _add(scene, "/wind/arrow", machinery.arrow().moved((-1.0, 0.0, 0.0)), _WIND)
         self._blades = {blade: _Blade(scene, blade) for blade in BLADES}
@@ -174,6 +195,11 @@ class HubScene:
                 for one in self._turbine:
                     one.visible = has_rotor
 
+    def show_actuators(self, poses: Sequence[ActuatorPose]) -> None:
+        """Move and colour the cylinders and what they turn; what did not change is not sent."""
+        with self._server.atomic():
+            self._actuators.show(poses)
+
     def show_rotor(self, pose: RotorPose) -> None:
         """Turn the rotor and the wind's arrow; what did not change is not sent."""
         before, self._rotor_shown = self._rotor_shown, pose
@@ -195,6 +221,7 @@ class HubScene:
         self.show(dict.fromkeys(BLADES, UNKNOWN_BLADE))
         self.show_rotor(UNKNOWN_ROTOR)
         self.show_shafts((), True)
+        self.show_actuators(())
 
     def played(self, stills: Iterable[tuple[Mapping[int, BladePose], RotorPose, float]]) -> str:
         """A page that shows ``stills``, each so many seconds long, over and over; what this one shows is its beginning.

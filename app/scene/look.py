@@ -84,6 +84,44 @@ class ShaftPose:
 
 
 @dataclass(frozen=True, slots=True)
+class CylinderPose:
+    """What is shown of one hydraulic cylinder; places of its rod are shares of the stroke, 0 is in.
+
+    ``extension`` None: nobody tells it. ``setpoint`` is where it should be, ``limits`` where it may be, None where
+    nothing of the kind is in force.
+    """
+
+    extension: float | None
+    state: BladeState
+    setpoint: float | None = None
+    limits: tuple[float, float] | None = None
+
+    @property
+    def shows_setpoint(self) -> bool:
+        """The rod is not yet where it should be: its ghost is worth showing."""
+        if self.setpoint is None or self.extension is None or self.state is BladeState.STALE:
+            return False
+        return abs(self.setpoint - self.extension) >= SETPOINT_REACHED
+
+
+SETPOINT_REACHED: Final = 0.004
+"""Of the stroke. Closer than this, rod and ghost would be one."""
+
+
+@dataclass(frozen=True, slots=True)
+class ActuatorPose:
+    """What is shown of the one or two cylinders that turn one blade. ``angle_deg`` None: it was never seen.
+
+    ``coupled``: both turn it, so that one that nobody tells of stands where the blade has it.
+    """
+
+    cylinders: tuple[CylinderPose, ...]
+    angle_deg: float | None
+    state: BladeState
+    coupled: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class RotorPose:
     """Rotor and wind. None: not known; a rotor of unknown azimuth stands with blade 1 upwards.
 

@@ -94,6 +94,11 @@ def usual_list(description: Description) -> PollList:
         wanted |= dict.fromkeys(AXIS_ROOM, Rate.SLOW)
     if SI_UNIT in description.entries:
         wanted |= dict.fromkeys(UNITS, Rate.RARE)
+    if description.cylinders is not None:
+        wanted[description.cylinders.position] = Rate.FAST
+        if description.machine is not None:
+            wanted[description.machine.statusword] = Rate.FAST
+        wanted |= dict.fromkeys(description.cylinders.still, Rate.SLOW)
     return {address: rate for address, rate in wanted.items() if address in description.entries}
 
 

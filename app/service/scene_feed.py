@@ -8,7 +8,17 @@ import logging
 from collections.abc import AsyncIterator
 from typing import Final
 
-from app.scene.hub import BLADES, BladePose, BladeState, HubScene, RotorPose, ShaftPose
+from app.scene.hub import (
+    BLADES,
+    ActuatorPose,
+    BladePose,
+    BladeState,
+    CylinderPose,
+    HubScene,
+    RotorPose,
+    ShaftPose,
+)
+from app.service.cylinder_view import CylinderLine, CylindersLine, cylinder_lines
 from app.service.rotor_view import NOBODY, RotorLine, rotor_line
 from app.service.shaft_view import ShaftLine, shaft_lines
 from app.service.shown import Shown
@@ -33,6 +43,17 @@ def pose(line: AxisLine) -> BladePose:
 def shaft_pose(line: ShaftLine) -> ShaftPose:
     """How an axis without a blade looks: its last angle, coloured as a blade would be."""
     return ShaftPose(line.shaft_deg, line.motor_deg, BladeState(line.look), line.turns)
+
+
+def actuator_pose(line: CylindersLine) -> ActuatorPose:
+    """How the cylinders of a station look, and the blade that they turn."""
+    return ActuatorPose(
+        tuple(map(_cylinder_pose, line.cylinders)), line.angle_deg, BladeState(line.look), line.synchronous is True
+    )
+
+
+def _cylinder_pose(line: CylinderLine) -> CylinderPose:
+    return CylinderPose(line.extension, BladeState(line.look), line.setpoint_at, line.limits_at)
 
 
 def rotor_pose(line: RotorLine) -> RotorPose:
@@ -101,6 +122,7 @@ class SceneFeed:
         """All now; nothing is known of what is not connected."""
         poses, rotor = dict.fromkeys(BLADES, BladePose(None, BladeState.UNKNOWN)), NOBODY
         shafts: list[ShaftPose] = []
+        actuators: list[ActuatorPose] = []
         has_rotor = True
         stage = self._source.stage
         if stage is not None:
@@ -109,9 +131,13 @@ class SceneFeed:
             poses |= {line.blade: pose(line) for line in axis_lines(stage.turbine, targets, now_ns)}
             rotor = rotor_line(stage.live, now_ns)
             shafts = [shaft_pose(line) for line in shaft_lines(stage.turbine, targets, now_ns)]
-            has_rotor = not shafts or any(station.blade is not None for station in stage.turbine.stations)
+            actuators = [actuator_pose(line) for line in cylinder_lines(stage.turbine, targets, now_ns)]
+            has_rotor = not (shafts or actuators) or any(
+                station.blade is not None for station in stage.turbine.stations
+            )
         self._scene.show(poses)
         self._scene.show_shafts(shafts, has_rotor)
+        self._scene.show_actuators(actuators)
         self._show_rotor(rotor_pose(rotor))
 
     def _show_rotor(self, pose: RotorPose) -> None:

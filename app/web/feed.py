@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
 from app import __version__
+from app.service.cylinder_view import CylindersLine, cylinder_lines
 from app.service.devices import Target
 from app.service.instructor import InstructorLine
 from app.service.link import LinkLine, link_urgent
@@ -38,6 +39,7 @@ from app.web.models import (
     BenchData,
     BenchMessage,
     CursorMessage,
+    CylindersMessage,
     EventMessage,
     HeartbeatMessage,
     Hello,
@@ -57,6 +59,7 @@ from app.wire.live import Changes
 
 HEARTBEAT_S: Final = 0.25
 ROTOR_S: Final = 0.5
+CYLINDERS_S: Final = 0.05
 AXES_S: Final = 0.02
 AXES_LOOK_AGAIN_S: Final = 0.2
 AXES_AT_LEAST_S: Final = 1.0
@@ -93,6 +96,7 @@ class Feed:
         self._axes: tuple[AxisLine, ...] = ()
         self._axes_cursor = -1
         self._rotor = NOBODY
+        self._cylinders: tuple[CylindersLine, ...] = ()
         self._instructor: InstructorLine | None = None
         self._motion: MotionLine | None = None
         self._cursor_line: CursorLine | None = None
@@ -157,6 +161,8 @@ class Feed:
             yield from self._axes_due(now_s)
         if "rotor" in self._topics:
             yield from self._rotor_due(now_s)
+        if "cylinders" in self._topics:
+            yield from self._cylinders_due(now_s)
         if "instructor" in self._topics:
             yield from self._instructor_due()
         if "motion" in self._topics:
@@ -251,6 +257,15 @@ class Feed:
         if line != self._rotor or "rotor" in self._fresh:
             self._rotor = line
             yield RotorMessage(ctx=self._shown.ctx, seq=self._count(), t_ns=now_ns, data=line)
+
+    def _cylinders_due(self, now_s: float) -> Iterator[ServerMessage]:
+        if not self._passed("cylinders", now_s, CYLINDERS_S):
+            return
+        now_ns = self._shown.now_ns()
+        lines = () if self._stage is None else cylinder_lines(self._stage.turbine, self._targets, now_ns)
+        if lines != self._cylinders or "cylinders" in self._fresh:
+            self._cylinders = lines
+            yield CylindersMessage(ctx=self._shown.ctx, seq=self._count(), t_ns=now_ns, data=lines)
 
     def _instructor_due(self) -> Iterator[ServerMessage]:
         line = self._shown.instructor()

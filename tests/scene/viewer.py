@@ -29,6 +29,8 @@ class Viewer:
     def __init__(self, socket: ClientConnection) -> None:
         self._socket = socket
         self.turns: dict[str, tuple[float, ...]] = {}
+        self.places: dict[str, tuple[float, ...]] = {}
+        self.removed: list[str] = []
         self.visible: dict[str, bool] = {}
         self.updates: dict[str, dict[str, Any]] = {}
         self.windows = 0
@@ -46,6 +48,10 @@ class Viewer:
             case "SetOrientationMessage":
                 self.turns[name] = tuple(message["wxyz"])
                 self.windows += 1
+            case "SetPositionMessage":
+                self.places[name] = tuple(message["position"])
+            case "RemoveSceneNodeMessage":
+                self.removed.append(name)
             case "SetSceneNodeVisibilityMessage":
                 self.visible[name] = message["visible"]
             case "SceneNodeUpdateMessage":

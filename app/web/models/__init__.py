@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, StrictFloat, StrictInt, StrictStr
 
+from app.service.cylinder_view import CylindersLine
 from app.service.instructor import InstructorLine
 from app.service.link import LinkLine, Mode
 from app.service.motion.line import MotionLine
@@ -333,6 +334,13 @@ class RotorMessage(_Envelope):
     data: RotorLine
 
 
+class CylindersMessage(_Envelope):
+    """Topic ``cylinders``: hydraulic cylinders by station, where they changed, at most 20 times a second."""
+
+    type: Literal["cylinders"] = "cylinders"
+    data: tuple[CylindersLine, ...]
+
+
 class InstructorMessage(_Envelope):
     """Topic ``instructor``: faults and scenario of the twins that this server started, where they changed."""
 
@@ -405,6 +413,7 @@ ServerMessage = Annotated[
     | NodesMessage
     | AxesMessage
     | RotorMessage
+    | CylindersMessage
     | InstructorMessage
     | MotionMessage
     | ValuesMessage

@@ -5137,6 +5137,116 @@ export interface components {
             start_ns?: number | null;
         };
         /**
+         * CylinderLine
+         * @description One cylinder, ``number`` 1 or 2, of a station. Lengths are in ``unit``, which is empty where it is not known.
+         *
+         *     ``position`` None: no telegram carries it, or none was seen. ``setpoint`` is None while the rod follows none, and
+         *     ``limits`` where they do not count. ``extension``, ``setpoint_at`` and ``limits_at`` are the same as shares of the
+         *     stroke as drawn. ``state`` and ``fault_text_key`` are text keys; ``fault_code`` is 0 where this cylinder has no
+         *     fault, None where that is not known.
+         */
+        CylinderLine: {
+            /** Device */
+            device: string;
+            /** Extension */
+            extension: number | null;
+            /** Fault Code */
+            fault_code: number | null;
+            /** Fault Text Key */
+            fault_text_key: string | null;
+            /** Limits */
+            limits: [
+                number,
+                number
+            ] | null;
+            /** Limits At */
+            limits_at: [
+                number,
+                number
+            ] | null;
+            /**
+             * Look
+             * @enum {string}
+             */
+            look: "unknown" | "stale" | "idle" | "enabled" | "warning" | "fault";
+            /** Number */
+            number: number;
+            /** Position */
+            position: number | null;
+            /** Position T Ns */
+            position_t_ns: number | null;
+            /** Setpoint */
+            setpoint: number | null;
+            /** Setpoint At */
+            setpoint_at: number | null;
+            /** State */
+            state: string | null;
+            /**
+             * Unit
+             * @enum {string}
+             */
+            unit: "mm" | "in" | "°" | "";
+        };
+        /**
+         * CylindersLine
+         * @description What turns one blade. ``synchronous``: they move as one; None where nobody has told yet.
+         *
+         *     ``deviation`` is the first cylinder's position less the second's, None where not both are known and fresh.
+         *     ``angle_deg`` is how far the blade as drawn is turned by them (``app.scene.linkage``): no angle of a machine.
+         */
+        CylindersLine: {
+            /** Angle Deg */
+            angle_deg: number | null;
+            /** Blade */
+            blade: number | null;
+            /** Cylinders */
+            cylinders: components["schemas"]["CylinderLine"][];
+            /** Deviation */
+            deviation: number | null;
+            /**
+             * Look
+             * @enum {string}
+             */
+            look: "unknown" | "stale" | "idle" | "enabled" | "warning" | "fault";
+            /** Station */
+            station: string;
+            /** Synchronous */
+            synchronous: boolean | null;
+            /**
+             * Unit
+             * @enum {string}
+             */
+            unit: "mm" | "in" | "°" | "";
+        };
+        /**
+         * CylindersMessage
+         * @description Topic ``cylinders``: hydraulic cylinders by station, where they changed, at most 20 times a second.
+         */
+        CylindersMessage: {
+            /**
+             * Ctx
+             * @default live
+             */
+            ctx: string;
+            /** Data */
+            data: components["schemas"]["CylindersLine"][];
+            /** Seq */
+            seq: number;
+            /** T Ns */
+            t_ns: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            type: "cylinders";
+            /**
+             * V
+             * @default 1
+             * @constant
+             */
+            v: 1;
+        };
+        /**
          * DamageRef
          * @description A stretch of a file that cannot be used.
          */
@@ -9556,7 +9666,7 @@ export interface components {
             /** Unit */
             unit: string;
         };
-        ServerMessage: components["schemas"]["HelloMessage"] | components["schemas"]["BenchMessage"] | components["schemas"]["HeartbeatMessage"] | components["schemas"]["LinkMessage"] | components["schemas"]["NodesMessage"] | components["schemas"]["AxesMessage"] | components["schemas"]["RotorMessage"] | components["schemas"]["InstructorMessage"] | components["schemas"]["MotionMessage"] | components["schemas"]["ValuesMessage"] | components["schemas"]["EventMessage"] | components["schemas"]["TraceMessage"] | components["schemas"]["CursorMessage"] | components["schemas"]["GoneMessage"] | components["schemas"]["UrgentMessage"];
+        ServerMessage: components["schemas"]["HelloMessage"] | components["schemas"]["BenchMessage"] | components["schemas"]["HeartbeatMessage"] | components["schemas"]["LinkMessage"] | components["schemas"]["NodesMessage"] | components["schemas"]["AxesMessage"] | components["schemas"]["RotorMessage"] | components["schemas"]["CylindersMessage"] | components["schemas"]["InstructorMessage"] | components["schemas"]["MotionMessage"] | components["schemas"]["ValuesMessage"] | components["schemas"]["EventMessage"] | components["schemas"]["TraceMessage"] | components["schemas"]["CursorMessage"] | components["schemas"]["GoneMessage"] | components["schemas"]["UrgentMessage"];
         /**
          * Session
          * @description Who is served, and in which languages. ``user`` is null where a launch token opened the session.

@@ -10,7 +10,7 @@ import { useQuery } from "@tanstack/react-query";
 import { memo, useEffect, useMemo, useRef, useState } from "react";
 import { useTurbineQuery } from "../api/queries";
 import { replayOf } from "../live/channel";
-import { useShown } from "../live/live";
+import { useCylinders, useShown } from "../live/live";
 import { useTexts } from "../texts/texts";
 import classes from "./SceneDock.module.css";
 import { Facts } from "./SceneDockFacts";
@@ -20,6 +20,7 @@ import {
   BENCH_CAMERA,
   CAMERAS,
   type CameraName,
+  cylindersOf,
   tellScene,
   useSceneMessages,
   type View,
@@ -88,6 +89,7 @@ function SceneView() {
   const [attempt, setAttempt] = useState(0);
   const cameras = useCameras();
   const view = useView(cameras);
+  const ghosts = cameras.some((camera) => camera !== BENCH_CAMERA);
   // The frame gets its first view by its address; what changes later it is told, without being loaded again.
   const { ctx } = useShown();
   const known = useQuery(useTurbineQuery()).isFetched;
@@ -142,24 +144,31 @@ function SceneView() {
       </div>
       <div className={classes.foot}>
         <Cameras cameras={cameras} chosen={freed ? null : view.camera} onChoose={fly} />
-        {cameras.includes("front") && (
+        {ghosts && (
           <GhostSwitch on={view.ghosts} onChange={(on) => update({ ghost: on ? undefined : "off" })} />
         )}
       </div>
       {cameras.includes("front") && <Facts />}
-      <Legend ghost={cameras.includes("front")} />
+      <Legend ghost={ghosts} />
     </>
   );
 }
 
-/** Where one can look from: at blades, at an axis on a bench, or at both where there is both. */
+/** Where one can look from: at blades, at shafts on a bench, at cylinders, or at all that there is. */
 function useCameras(): readonly CameraName[] {
   const stations = useQuery(useTurbineQuery()).data?.stations ?? [];
+  const cylinders = useCylinders();
+  const hydraulic = new Set(cylinders.map(({ station }) => station));
   const blades = stations.length === 0 || stations.some((station) => station.blade !== null);
-  const bench = stations.some((station) => station.blade === null);
+  const bench = stations.some((station) => station.blade === null && !hydraulic.has(station.slug));
   return useMemo(
-    () => CAMERAS.filter((camera) => (camera === BENCH_CAMERA ? bench : blades)),
-    [bench, blades],
+    () =>
+      CAMERAS.filter((camera) => {
+        const number = cylindersOf(camera);
+        if (number !== null) return number <= cylinders.length;
+        return camera === BENCH_CAMERA ? bench : blades;
+      }),
+    [bench, blades, cylinders.length],
   );
 }
 
@@ -210,7 +219,8 @@ function Cameras({
     <div className={classes.cameras} role="group" aria-label={t("page.scene.cameras")}>
       {cameras.map((camera) => {
         const name = t(`page.scene.camera.${camera}`);
-        const short = camera.startsWith("blade-") ? camera.slice(-1) : name;
+        const several = camera.startsWith("cylinders-") && cameras.includes("cylinders-2");
+        const short = camera.startsWith("blade-") || several ? camera.slice(-1) : name;
         return (
           <button
             key={camera}

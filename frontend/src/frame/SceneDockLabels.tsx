@@ -9,9 +9,10 @@ import { useTexts } from "../texts/texts";
 import { type Place, placesOf, stationName } from "../ui/devices";
 import { timeOfDay } from "../ui/format";
 import { entriesOf, useDeviceContext, useReading } from "../ui/reading";
+import { CylinderLabels } from "./SceneDockCylinders";
 import { LookSign } from "./SceneDockLooks";
 import classes from "./SceneDock.module.css";
-import { arranged, BENCH_CAMERA, type CameraName, type Places } from "./sceneDockBridge";
+import { arranged, BENCH_CAMERA, type CameraName, cylindersOf, type Places } from "./sceneDockBridge";
 
 const BLADES = [1, 2, 3];
 const MARKS = [0, 90, 95];
@@ -34,7 +35,8 @@ export function Labels({ camera, selected, onSelect, ref }: Props) {
   const t = useTexts();
   const layer = useRef<HTMLDivElement>(null);
   const near = nearBlade(camera);
-  const shown = camera === BENCH_CAMERA ? [] : near === null ? BLADES : [near];
+  const actuator = cylindersOf(camera);
+  const shown = camera === BENCH_CAMERA || actuator !== null ? [] : near === null ? BLADES : [near];
   const shafts = useShafts(camera === BENCH_CAMERA);
   // Places come with every move of camera or rotor: they are set without rendering anything anew.
   useImperativeHandle(
@@ -53,6 +55,7 @@ export function Labels({ camera, selected, onSelect, ref }: Props) {
           onSelect={onSelect}
         />
       ))}
+      {actuator !== null && <CylinderLabels number={actuator} />}
       {shafts.map((place, at) => (
         <ShaftLabel key={place.device.slug} place={place} number={at + 1} />
       ))}

@@ -5,10 +5,24 @@
 import { type RefObject, useEffect, useEffectEvent } from "react";
 import type { Theme } from "./search";
 
-export const CAMERAS = ["front", "hub", "blade-1", "blade-2", "blade-3", "shaft"] as const;
+export const CAMERAS = [
+  "front",
+  "hub",
+  "blade-1",
+  "blade-2",
+  "blade-3",
+  "shaft",
+  "cylinders-1",
+  "cylinders-2",
+  "cylinders-3",
+] as const;
 /** Looks at what stands on a bench. */
 export const BENCH_CAMERA = "shaft";
 export type CameraName = (typeof CAMERAS)[number];
+
+/** Which cylinders a camera looks at, from 1 in the order of the stations that have some; null for another camera. */
+export const cylindersOf = (camera: CameraName): number | null =>
+  Number(/^cylinders-(\d)$/.exec(camera)?.[1] ?? 0) || null;
 
 /** What one view shows; others have their own. */
 export interface View {

@@ -7,7 +7,7 @@ export const LIVE = "live";
 const REPLAY = "replay/";
 
 /** Topics of every page; a replay has a cursor beside them. */
-const TOPICS = ["link", "nodes", "axes", "rotor", "instructor", "motion", "events"];
+const TOPICS = ["link", "nodes", "axes", "rotor", "cylinders", "instructor", "motion", "events"];
 
 export type Trace = TraceFilter & { id: number };
 

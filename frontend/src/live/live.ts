@@ -158,6 +158,7 @@ export const useAxes = () => useTopic("axes", (store) => store.axes);
 export const useAxis = <T>(blade: number, pick: (axis: AxisData | undefined) => T): T =>
   useDerived(["axes"], (store) => pick(store.axes.get(blade)));
 export const useRotor = () => useTopic("rotor", (store) => store.rotor);
+export const useCylinders = () => useTopic("cylinders", (store) => store.cylinders);
 export const useInstructor = () => useTopic("instructor", (store) => store.instructor);
 export const useEvents = () => useTopic("events", (store) => store.events);
 export const useLoadHistory = () => useTopic("link", (store) => store.loadHistory);

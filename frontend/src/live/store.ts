@@ -3,7 +3,7 @@
  *
  * Messages are taken in at once but shown coalesced: listeners of a topic are told at most once a tick of `schedule`
  * (an animation frame in the browser), however many messages came. Topics: "hearing", "bench", "link", "nodes", "axes",
- * "rotor", "instructor", "motion", "events", "cursor", "device:<slug>" and "value:<slug>/<address>".
+ * "rotor", "cylinders", "instructor", "motion", "events", "cursor", "device:<slug>" and "value:<slug>/<address>".
  *
  * The store of a recording goes by the time of its cursor, and forgets whatever it knew as soon as that is set elsewhere.
  */
@@ -11,6 +11,7 @@ import type {
   AxisData,
   BenchData,
   CursorData,
+  CylindersData,
   EventData,
   InstructorData,
   LinkData,
@@ -51,6 +52,7 @@ export class LiveStore {
   nodes: ReadonlyMap<string, NodeData> = new Map();
   axes: ReadonlyMap<number, AxisData> = new Map();
   rotor: RotorData | null = null;
+  cylinders: readonly CylindersData[] = [];
   instructor: InstructorData | null = null;
   motion: MotionData | null = null;
   events: readonly NumberedEvent[] = [];
@@ -135,6 +137,9 @@ export class LiveStore {
       case "rotor":
         this.rotor = message.data;
         return this.mark("rotor");
+      case "cylinders":
+        this.cylinders = message.data;
+        return this.mark("cylinders");
       case "instructor":
         this.instructor = message.data;
         return this.mark("instructor");
@@ -167,11 +172,12 @@ export class LiveStore {
     this.nodes = new Map();
     this.axes = new Map();
     this.rotor = null;
+    this.cylinders = [];
     this.traces.clear();
     this.deviceTraces.clear();
     // The bench goes on after another connection; what a recording tells is told anew from where its cursor stands.
     if (this.recorded) this.events = [];
-    for (const topic of ["nodes", "axes", "rotor", "events"]) this.mark(topic);
+    for (const topic of ["nodes", "axes", "rotor", "cylinders", "events"]) this.mark(topic);
     for (const device of [...this.devices.keys()]) this.applyValues({ device, full: true, values: {} });
   }
 
