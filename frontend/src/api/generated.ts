@@ -594,6 +594,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/live/bus/lines": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Bus Lines
+         * @description Each bus as its driver has it: its line, and where it keeps stations, each of them with what is exchanged.
+         */
+        get: operations["bus_lines"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/live/bus/load": {
         parameters: {
             query?: never;
@@ -1250,6 +1270,46 @@ export interface paths {
          * @description Read the motor's parameters of a device over the wire, and add the motor with them.
          */
         post: operations["add_motor_of_device"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/live/devices/{turbine}/{station}/{device}/order/check": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Check Order
+         * @description The guided check of the order of bytes: parameters are read and compared with the process data of that moment.
+         */
+        post: operations["check_order"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/live/devices/{turbine}/{station}/{device}/order/keep": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Keep Order
+         * @description Check once more, and note the order in the site file where nothing contradicts it; in force from the next connection on.
+         */
+        post: operations["keep_order"];
         delete?: never;
         options?: never;
         head?: never;
@@ -5172,6 +5232,24 @@ export interface components {
             verifies: boolean;
         };
         /**
+         * DiagnosisDoc
+         * @description The latest Slave_Diag. ``data`` are its bytes; ``master`` null: none has parametrised it.
+         *
+         *     ``status`` are the names of the bits that are set, as text keys; ``blocks`` the extended diagnosis in words.
+         */
+        DiagnosisDoc: {
+            /** Blocks */
+            blocks: components["schemas"]["SaidDoc"][];
+            /** Data */
+            data: string;
+            /** Ident */
+            ident: number;
+            /** Master */
+            master: number | null;
+            /** Status */
+            status: string[];
+        };
+        /**
          * DraftIn
          * @description A motor as a person has it; ``values`` are raw, by address.
          * @example {
@@ -6540,6 +6618,47 @@ export interface components {
             version: string;
         };
         /**
+         * LineDoc
+         * @description A bus of the connection as its driver has it. ``bitrate`` 0: it has none; ``load`` 0..1.
+         *
+         *     ``master`` is our own address where the bus has one. ``stations`` are empty where its driver keeps none.
+         */
+        LineDoc: {
+            /** Bitrate */
+            bitrate: number;
+            /** Bus */
+            bus: string;
+            /** Connection */
+            connection: string;
+            /** Dropped */
+            dropped: number;
+            /** Frames */
+            frames: number;
+            /**
+             * Kind
+             * @enum {string}
+             */
+            kind: "canopen" | "modbus-tcp" | "profibus-dp";
+            /** Load */
+            load: number;
+            /** Master */
+            master: number | null;
+            problem: components["schemas"]["Failure"] | null;
+            /** Reason */
+            reason: string;
+            /** Reconnects */
+            reconnects: number;
+            /** Since T Ns */
+            since_t_ns: number;
+            /**
+             * State
+             * @enum {string}
+             */
+            state: "closed" | "listening" | "connected" | "lost";
+            /** Stations */
+            stations: components["schemas"]["StationDoc"][];
+        };
+        /**
          * LinkLine
          * @description The connection as a whole. With several buses: the state of the worst one, and the highest load.
          */
@@ -7400,6 +7519,58 @@ export interface components {
          * @enum {string}
          */
         Order: "before" | "then" | "without";
+        /**
+         * OrderCheckDoc
+         * @description What the guided check found. ``fits`` are the orders that nothing contradicts, ``setting`` what the site says.
+         *
+         *     ``proven`` null: nothing but zeros may be sent, for the reason of ``reason_key``.
+         */
+        OrderCheckDoc: {
+            /** Fits */
+            fits: ("low-low" | "low-high" | "high-low" | "high-high")[];
+            /** Proven */
+            proven: ("low-low" | "low-high" | "high-low" | "high-high") | null;
+            /** Readings */
+            readings: components["schemas"]["OrderReadingDoc"][];
+            /** Reason Key */
+            reason_key: string | null;
+            /** Setting */
+            setting: ("low-low" | "low-high" | "high-low" | "high-high") | null;
+        };
+        /**
+         * OrderKept
+         * @description The order of bytes that the site file is to name.
+         * @example {
+         *       "order": "high-high"
+         *     }
+         */
+        OrderKept: {
+            /**
+             * Order
+             * @enum {string}
+             */
+            order: "low-low" | "low-high" | "high-low" | "high-high";
+        };
+        /**
+         * OrderReadingDoc
+         * @description One parameter of the check: ``value`` as PKW read it, ``data`` its process data of that moment.
+         *
+         *     ``said`` is what the bytes tell by each order.
+         */
+        OrderReadingDoc: {
+            /** Address */
+            address: string | null;
+            /** Data */
+            data: string;
+            /** Said */
+            said: {
+                [key: string]: number;
+            };
+            /** Signal */
+            signal: string;
+            /** Value */
+            value: number;
+        };
         /**
          * OrderRequest
          * @description An order to an axis; ``order`` rises with each one of a page, so that an old one does nothing.
@@ -9149,6 +9320,18 @@ export interface components {
             took_ms: number;
         };
         /**
+         * SaidDoc
+         * @description A text and what fills its placeholders.
+         */
+        SaidDoc: {
+            /** Details */
+            details: {
+                [key: string]: unknown;
+            };
+            /** Text Key */
+            text_key: string;
+        };
+        /**
          * Same
          * @description What both sides of a pair must have in common.
          * @enum {string}
@@ -9740,6 +9923,22 @@ export interface components {
          */
         SignKind: "emcy" | "emcy_reset" | "error_code" | "boot_up" | "nmt_command" | "write_aborted" | "parameter_written" | "gap" | "axis_fault" | "axis_warning" | "axis_enabled" | "quick_stop" | "remote_lost" | "internal_limit" | "following_error" | "efc_command" | "efc_input" | "enable_input" | "limit_switch" | "feather_switch" | "watchdog_open" | "chain_open" | "relay_open" | "pmm_fault" | "pmm_warning" | "battery_fault" | "battery_test" | "on_battery" | "mains_high" | "mains_phase" | "mains_low" | "booster" | "hold_up_over" | "device_status" | "limit" | "silent" | "not_operational";
         /**
+         * SignalDoc
+         * @description One signal of process data; ``address`` is the parameter of the same value, null where there is none.
+         *
+         *     ``raw`` null: the order of bytes is not proven, so nobody knows what they tell.
+         */
+        SignalDoc: {
+            /** Address */
+            address: string | null;
+            /** Name */
+            name: string;
+            /** Number */
+            number: number;
+            /** Raw */
+            raw: number | null;
+        };
+        /**
          * SignalLine
          * @description One object of a device that is a number, as it was seen in the recording.
          *
@@ -10176,6 +10375,39 @@ export interface components {
             values: number;
         };
         /**
+         * StationDoc
+         * @description One station. ``state`` null: the line is gone, so nothing is known of it.
+         *
+         *     ``dp_state`` and ``watchdog_state`` null: it has not told. ``order`` is the order of bytes that is proven,
+         *     ``setting`` what the site says. ``age_ms`` is that of the latest inputs that were surely of now, null where there
+         *     were none since it is there; ``starts`` counts how often it has begun to exchange data.
+         */
+        StationDoc: {
+            /** Age Ms */
+            age_ms: number | null;
+            /** Device */
+            device: string;
+            diagnosis: components["schemas"]["DiagnosisDoc"] | null;
+            /** Dp State */
+            dp_state: ("wait_prm" | "wait_cfg" | "data_exchange") | null;
+            /** Node */
+            node: number;
+            /** Order */
+            order: ("low-low" | "low-high" | "high-low" | "high-high") | null;
+            problem: components["schemas"]["Failure"] | null;
+            /** Setting */
+            setting: ("low-low" | "low-high" | "high-low" | "high-high") | null;
+            /** Stale */
+            stale: boolean;
+            /** Starts */
+            starts: number;
+            /** State */
+            state: ("absent" | "starting" | "exchanging") | null;
+            telegram: components["schemas"]["TelegramDoc"] | null;
+            /** Watchdog State */
+            watchdog_state: ("baud_control" | "dp_control") | null;
+        };
+        /**
          * StationFindings
          * @description One station: the devices that were judged together, and the findings, the gravest first.
          */
@@ -10303,6 +10535,24 @@ export interface components {
              * @enum {string}
              */
             tag: "as-delivered" | "golden" | "as-found" | "as-left";
+        };
+        /**
+         * TelegramDoc
+         * @description The telegram type that is exchanged. Sizes in bytes, PKW included; ``received`` is what the slave gets.
+         */
+        TelegramDoc: {
+            /** Has Pkw */
+            has_pkw: boolean;
+            /** Input Size */
+            input_size: number;
+            /** Number */
+            number: number;
+            /** Output Size */
+            output_size: number;
+            /** Received */
+            received: components["schemas"]["WordDoc"][];
+            /** Sent */
+            sent: components["schemas"]["WordDoc"][];
         };
         /**
          * TestRecord
@@ -11109,6 +11359,20 @@ export interface components {
             person: string;
             /** Started Ns */
             started_ns: number;
+        };
+        /**
+         * WordDoc
+         * @description ``words`` words of process data from ``word`` (from 1) on, and what shares them. ``data`` empty: none yet.
+         */
+        WordDoc: {
+            /** Data */
+            data: string;
+            /** Signals */
+            signals: components["schemas"]["SignalDoc"][];
+            /** Word */
+            word: number;
+            /** Words */
+            words: number;
         };
         /**
          * WordsDoc
@@ -13611,6 +13875,62 @@ export interface operations {
             };
             /** @description Forbidden */
             403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    bus_lines: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["LineDoc"][];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Conflict */
+            409: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -16751,6 +17071,230 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["MotorDoc"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Conflict */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Bad Gateway */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Service Unavailable */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Gateway Timeout */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    check_order: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                turbine: string;
+                station: string;
+                device: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /** @example {} */
+                "application/json": components["schemas"]["Nothing"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["OrderCheckDoc"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Conflict */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Bad Gateway */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Service Unavailable */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Gateway Timeout */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    keep_order: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                turbine: string;
+                station: string;
+                device: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "order": "high-high"
+                 *     }
+                 */
+                "application/json": components["schemas"]["OrderKept"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["OrderCheckDoc"];
                 };
             };
             /** @description Unauthorized */
