@@ -1307,7 +1307,7 @@ export interface paths {
         put?: never;
         /**
          * Keep Order
-         * @description Check once more, and note the order in the site file where nothing contradicts it; in force from the next connection on.
+         * @description Check once more, and note the order in the site file where nothing contradicts it: for the next connection.
          */
         post: operations["keep_order"];
         delete?: never;
@@ -3701,7 +3701,7 @@ export interface paths {
         put?: never;
         /**
          * Start Scan
-         * @description Ask every node of a bus what it is.
+         * @description Ask every node of a bus what it is, or every address of a PROFIBUS line.
          */
         post: operations["start_scan"];
         delete?: never;
@@ -4579,7 +4579,8 @@ export interface components {
          * @description A bus of a turbine; ``bitrate`` 0: the connection names it.
          *
          *     ``heartbeat_node``: as whom this tool beats on it while axes are moved. ``connection`` ``modbus-tcp``: its devices
-         *     have addresses, all within ``ranges``; it has no bit rate (0) then.
+         *     have addresses, all within ``ranges``; it has no bit rate (0) then. ``profibus:PORT`` is a line of PROFIBUS-DP, on
+         *     which ``master`` is our own address.
          */
         BusDoc: {
             /** Bitrate */
@@ -4591,6 +4592,11 @@ export interface components {
              * @default 126
              */
             heartbeat_node: number;
+            /**
+             * Master
+             * @default 2
+             */
+            master: number;
             /** Name */
             name: string;
             /**
@@ -5179,7 +5185,7 @@ export interface components {
              * Bus
              * @enum {string}
              */
-            bus: "canopen" | "modbus-tcp";
+            bus: "canopen" | "modbus-tcp" | "profibus-dp";
             /** Id */
             id: string;
             /** Name */
@@ -9394,7 +9400,7 @@ export interface components {
         };
         /**
          * ScanRequest
-         * @description ``consent``: ask the devices although another master is on the bus.
+         * @description ``consent``: ask the devices although another master is on the bus. ``master``: our own address on PROFIBUS.
          * @example {
          *       "connection": "socketcan:can0"
          *     }
@@ -9412,6 +9418,11 @@ export interface components {
              * @default false
              */
             consent: boolean;
+            /**
+             * Master
+             * @default 2
+             */
+            master: number;
         };
         /**
          * ScenarioDoc
@@ -10209,7 +10220,8 @@ export interface components {
          * @description A device; ``slug`` is its own part of the path.
          *
          *     ``address`` (HOST[:PORT][/UNIT]) is where it listens on Modbus TCP. ``external_stop`` says what stops this axis from
-         *     outside where its bus cannot prove that it stops by itself; experts change it.
+         *     outside where its bus cannot prove that it stops by itself; experts change it. ``telegram`` (null: the one it is set
+         *     to), ``pzd_order`` (``high-high`` and the like, empty: not known), ``gsd`` and ``modules`` are of PROFIBUS-DP.
          */
         SiteDeviceDoc: {
             /**
@@ -10226,12 +10238,29 @@ export interface components {
              * @default
              */
             external_stop: string;
+            /**
+             * Gsd
+             * @default
+             */
+            gsd: string;
+            /**
+             * Modules
+             * @default []
+             */
+            modules: string[];
             /** Name */
             name: string;
             /** Node */
             node: number;
+            /**
+             * Pzd Order
+             * @default
+             */
+            pzd_order: string;
             /** Slug */
             slug: string;
+            /** Telegram */
+            telegram?: number | null;
         };
         /**
          * SiteDoc
