@@ -1,6 +1,7 @@
 import { describe, expect, it } from "vitest";
 import type { FoundDevice, SiteTurbine } from "../../api/settings";
 import { emptyTurbine, fieldOf, flawsOf, isKnown, takeOver } from "./siteDraft";
+import { NO_SLAVE } from "./profibusDraft";
 
 const turbine = (): SiteTurbine => ({
   slug: "wtg-08",
@@ -20,6 +21,7 @@ const turbine = (): SiteTurbine => ({
           node: 1,
           address: "",
           external_stop: "",
+          ...NO_SLAVE,
         },
       ],
     },
@@ -65,6 +67,7 @@ describe("a turbine that is edited", () => {
       node: 1,
       address: "",
       external_stop: "",
+      ...NO_SLAVE,
     });
     expect(kinds(one, ["wtg-08"])).toEqual([
       "slug taken",
@@ -80,6 +83,7 @@ describe("a turbine that is edited", () => {
       node: 1,
       address: "",
       external_stop: "",
+      ...NO_SLAVE,
     });
     expect(kinds(one)).toContain("station.blade-1.device.pmc.node node_taken");
   });
