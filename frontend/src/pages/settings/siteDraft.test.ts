@@ -6,7 +6,16 @@ import { NO_SLAVE } from "./profibusDraft";
 const turbine = (): SiteTurbine => ({
   slug: "wtg-08",
   name: "WTG-08",
-  buses: [{ name: "can0", connection: "socketcan:can0", bitrate: 500_000, heartbeat_node: 126, ranges: [] }],
+  buses: [
+    {
+      name: "can0",
+      connection: "socketcan:can0",
+      bitrate: 500_000,
+      heartbeat_node: 126,
+      ranges: [],
+      master: 2,
+    },
+  ],
   stations: [
     {
       slug: "blade-1",
