@@ -74,10 +74,8 @@ def test_a_line_is_looked_at_and_its_order_of_bytes_proven_and_noted(
 
 def test_a_line_is_edited_in_the_settings(at_bench: BrowserContext, url: str, site: Path) -> None:
     page = at_bench.new_page()
-    page.goto(f"{url.split('?')[0]}settings?section=turbines&turbine=bench-ed2&scene=off&lang=en")
-    edit = page.get_by_role("button", name=re.compile("edit|change", re.IGNORECASE))
-    if page.get_by_test_id("bus-kind-dp0").count() == 0:
-        edit.first.click()
+    page.goto(f"{url.split('?')[0]}settings?section=turbines&scene=off&lang=en")
+    page.get_by_test_id("turbine-bench-ed2").click()
     expect(page.get_by_test_id("bus-kind-dp0")).to_have_value("PROFIBUS-DP", timeout=SLOW_MS)
     port = load_site(site)[0].buses[0].connection.removeprefix("profibus:")
     expect(page.get_by_test_id("line-port")).to_have_value(port)

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from app.drivers.contract import LinkState
+from app.drivers.profibus_view import StationView
 from app.errors import SettingsError, UsageError
 from app.model.description import Verify
 from app.model.site import load_site
@@ -33,7 +34,7 @@ async def one_line(connection: Connection) -> lines.Line:
     return line
 
 
-async def station_that(connection: Connection, holds: Callable[[lines.StationView], bool]) -> lines.StationView:
+async def station_that(connection: Connection, holds: Callable[[StationView], bool]) -> StationView:
     """The station once it ``holds``."""
     async with asyncio.timeout(DEADLINE_S):
         while True:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Final, get_args
+from typing import TYPE_CHECKING, Final, get_args
 
 from fastapi import APIRouter
 
@@ -37,6 +37,9 @@ from app.wire.profibus.diagnosis import (
 from app.wire.profibus.fields import FormatError
 from app.wire.profibus.pzd import Order, Values
 from app.wire.profibus.slave_states import dp_state, watchdog_state
+
+if TYPE_CHECKING:  # it comes with an optional package
+    from app.drivers.profibus_view import StationView
 
 router = APIRouter()
 STALE_S: Final = 1.0
@@ -84,7 +87,7 @@ def _line(line: Line) -> LineDoc:
     )
 
 
-def _station(slug: str, node: int, view: lines.StationView | None) -> StationDoc:
+def _station(slug: str, node: int, view: StationView | None) -> StationDoc:
     if view is None:
         return StationDoc(
             device=slug, node=node, state=None, problem=None, dp_state=None, watchdog_state=None, diagnosis=None,
