@@ -182,6 +182,9 @@ class CanOpenDriver:
         """Allow active access although another master is on the bus."""
         self._consent = True
 
+    def says_twin(self, node: int) -> None:
+        """See Driver. By its name."""
+
     def subscribe(self, callback: FramesCallback) -> Callable[[], None]:
         """See Driver. Our own frames are tapped where they are sent."""
         self._port.add_listener(callback)

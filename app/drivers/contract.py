@@ -187,6 +187,9 @@ class Driver(Protocol):
     ) -> list[FoundNode]:
         """Find and identify the devices."""
 
+    def says_twin(self, node: int) -> bool | None:
+        """Whether ``node`` says by its bus that it is simulated; None: by its name (1008h), or not at all."""
+
     def subscribe(self, callback: FramesCallback) -> Callable[[], None]:
         """Have every frame handed to ``callback``; the returned function ends that."""
 

@@ -122,6 +122,9 @@ class ModbusDriver:
         reconnects = sum(device.reconnects for device in devices)
         return DriverStatus(self.bus, worst.state, worst.since_ns, worst.reason, 0, reconnects, ())
 
+    def says_twin(self, node: int) -> None:
+        """See Driver. By its name."""
+
     def subscribe(self, callback: FramesCallback) -> Callable[[], None]:
         """See Driver. Called in the event loop."""
         self._subscribers = [*self._subscribers, callback]

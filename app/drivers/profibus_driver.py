@@ -148,6 +148,17 @@ class ProfibusDriver:
         line = self._line
         return DriverStatus(self.bus, line.state, line.since_ns, line.reason, 0, line.reconnects, ())
 
+    def says_twin(self, node: int) -> bool | None:
+        """See Driver. By its ident number, which it tells whenever it is probed."""
+        station = self._line.stations.get(node)
+        probed = None if station is None else station.probed
+        return None if probed is None else is_twin(probed)
+
+    @property
+    def problem(self) -> HubsideError | None:
+        """Why the line is not open; None while it is."""
+        return self._line.error
+
     def subscribe(self, callback: FramesCallback) -> Callable[[], None]:
         """See Driver."""
         return self._taps.subscribe(callback)
@@ -243,8 +254,8 @@ class ProfibusDriver:
 
     async def view(self, node: int) -> StationView:
         """Where the station at ``node`` is, and its process data. Raises BusLostError."""
-        self._device(node)
-        shown = await look_at(self._line, node) if self._open and self._line.error is None else None
+        proven = self._device(node).startup.proven
+        shown = await look_at(self._line, node, proven) if self._open and self._line.error is None else None
         if shown is None:
             raise BusLostError(bus=self.bus, node=node, reason=self._line.reason or LinkState.CLOSED.value)
         return shown

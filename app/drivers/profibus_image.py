@@ -61,6 +61,13 @@ class Image:
         """As it stands in the telegrams."""
         return self.values.get(CONTROL_WORD, 0)
 
+    @property
+    def standing(self) -> bytes:
+        """Bytes as they stand in the telegrams. Raises ValueError where a value does not fit its signal."""
+        if self.order is None:
+            return bytes(2 * self.telegram.received_words)
+        return encode_pzd(self.telegram.received, self.values, self.order)
+
     def put(self, change: Change) -> None:
         """Queue it. An urgent one takes the place of all that waits."""
         if not change.urgent:
@@ -92,9 +99,7 @@ class Image:
                 self.values.update(change.values)
             else:
                 change.end(failure, False)
-        if self.order is None:
-            return bytes(2 * self.telegram.received_words)
-        return encode_pzd(self.telegram.received, self.values, self.order)
+        return self.standing
 
     def delivered(self) -> None:
         """The station has surely taken what ``outputs`` gave."""

@@ -14,6 +14,7 @@ from app.drivers.profibus_order import ATTEMPTS, OrderCheck, evidence_of
 from app.drivers.profibus_station import Station
 from app.errors import PreconditionError
 from app.model.address import Address, Addressing
+from app.wire.profibus.pzd import Order
 from app.wire.profibus.telegrams import (
     ACTUAL,
     CONTROL_WORD,
@@ -59,9 +60,18 @@ class Startup:
         self.check: OrderCheck | None = None
         """The latest comparison."""
         self._device = device
+        self._checked = 0
+        """Of which start of the station that is."""
         self._prepared = 0
         """Of which start of the station the process data are filled and their order is proven."""
         self._preparing = asyncio.Lock()
+
+    @property
+    def proven(self) -> Order | None:
+        """The order of process data that was proven since the station is there."""
+        station = self._device.station
+        current = station is not None and self.check is not None and self._checked == station.starts
+        return self.check.proven if current and self.check is not None else None
 
     async def prepare(self, address: Address) -> OrderCheck:
         """Prove the order of process data and fill them with what the station has; nothing where that is done.
@@ -101,7 +111,7 @@ class Startup:
                 if found.fits:
                     break
             evidence.append(found)
-        self.check = OrderCheck(tuple(evidence), station.config.order)
+        self.check, self._checked = OrderCheck(tuple(evidence), station.config.order), station.starts
         return self.check
 
     async def _present(self, station: Station) -> dict[Signal, int]:

@@ -109,6 +109,11 @@ class BusLink(BusFeed):
         status: DriverStatus = self.driver.status
         return status
 
+    def says_twin(self, node: int) -> bool | None:
+        """Whether ``node`` says by its bus that it is simulated; None where it would say so by its name."""
+        said: bool | None = self.driver.says_twin(node)
+        return said
+
     @property
     def needs_consent(self) -> bool:
         """Another master is at work, and nobody has consented to active access yet."""

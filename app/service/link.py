@@ -52,6 +52,9 @@ class Bus(Protocol):
     def bus_load(self, now_ns: int) -> float:
         """Load of the last second, 0..1."""
 
+    def says_twin(self, node: int) -> bool | None:
+        """Whether ``node`` says by its bus that it is simulated; None where it would say so by its name."""
+
 
 @dataclass(frozen=True, slots=True)
 class RecordingLine:
@@ -115,8 +118,11 @@ class TwinWatch:
         return self._ours or (bool(answers) and all(answers))
 
     def _is_twin(self, target: Target, status: DriverStatus) -> bool:
+        by_bus = self._buses[target.device.bus].says_twin(target.node)
         view = target.live.value(target.device.bus, target.node, DEVICE_NAME)
-        if view is not None and view.stale:
+        if by_bus is not None:
+            self._said[target.slug] = by_bus, status.reconnects
+        elif view is not None and view.stale:
             self._said.pop(target.slug, None)
         elif view is not None and view.reading is not None:
             self._said[target.slug] = view.reading.data.startswith(TWIN_NAME.encode()), status.reconnects

@@ -10,6 +10,7 @@ from app.errors import SiteError, UsageError
 from app.model.description import Bus, Description
 from app.model.servers import MODBUS
 from app.model.site import HEARTBEAT_NODE, BusConfig, Turbine
+from app.model.slaves import MASTER, PROFIBUS, UNKNOWN, SlaveSetup
 
 _TEXT_MAX: Final = 100
 
@@ -44,12 +45,23 @@ def check_kinds(turbine: Turbine, file: str) -> None:
     """What only a bus of the other kind has would be left out of the file. Raises SiteError with the key."""
     for bus in turbine.buses:
         key, reason = f"turbine.{turbine.slug}.bus.{bus.name}", f"is not for a bus with connection '{MODBUS}'"
-        if bus.kind is Bus.CANOPEN and bus.ranges:
+        if bus.kind is not Bus.MODBUS_TCP and bus.ranges:
             raise SiteError(file=file, key=f"{key}.ranges", reason=f"is for a bus with connection '{MODBUS}'")
+        if bus.kind is Bus.PROFIBUS_DP and bus.heartbeat_node != HEARTBEAT_NODE:
+            reason = f"is not for a bus with connection '{PROFIBUS}PORT'"
+            raise SiteError(file=file, key=f"{key}.heartbeat_node", reason=reason)
+        if bus.kind is not Bus.PROFIBUS_DP and bus.master != MASTER:
+            raise SiteError(file=file, key=f"{key}.master", reason=f"is for a bus with connection '{PROFIBUS}PORT'")
         if bus.kind is Bus.MODBUS_TCP and bus.bitrate:
             raise SiteError(file=file, key=f"{key}.bitrate", reason=reason)
         if bus.kind is Bus.MODBUS_TCP and bus.heartbeat_node != HEARTBEAT_NODE:
             raise SiteError(file=file, key=f"{key}.heartbeat_node", reason=reason)
+    lines = {bus.name for bus in turbine.buses if bus.kind is Bus.PROFIBUS_DP}
+    for device in turbine.devices:
+        if device.slave != UNKNOWN and device.bus not in lines:
+            given = next(name for name in SlaveSetup._fields if getattr(device.slave, name) != getattr(UNKNOWN, name))
+            reason = f"is for a bus with connection '{PROFIBUS}PORT'"
+            raise SiteError(file=file, key=f"{device.slug}.{given}", reason=reason)
 
 
 def stops_of(turbine: Turbine | None) -> dict[str, tuple[str, str, str]]:

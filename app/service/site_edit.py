@@ -222,13 +222,24 @@ def _document(turbine: Turbine | None) -> dict[str, Any]:
 def _bus_text(bus: BusConfig) -> str:
     if bus.kind is Bus.MODBUS_TCP:
         return f"{bus.connection} {', '.join(bus.ranges)}"
-    return f"{bus.connection}@{bus.bitrate}"
+    master = f", master {bus.master}" if bus.kind is Bus.PROFIBUS_DP else ""
+    return f"{bus.connection}@{bus.bitrate}{master}"
 
 
 def _device_text(device: Device) -> str:
     text = f"{device.name}, {device.description_id}, {device.bus} node {device.node}"
     address = f" at {device.address}" if device.address else ""
-    return text + address + (f", stopped by {device.external_stop}" if device.external_stop else "")
+    return (
+        text + address + _slave_text(device) + (f", stopped by {device.external_stop}" if device.external_stop else "")
+    )
+
+
+def _slave_text(device: Device) -> str:
+    slave = device.slave
+    telegram = "" if slave.telegram is None else f", telegram {slave.telegram}"
+    order = f", order {slave.pzd_order}" if slave.pzd_order else ""
+    gsd = f", {slave.gsd}: {', '.join(slave.modules)}" if slave.gsd else ""
+    return telegram + order + gsd
 
 
 # -- found devices ------------------------------------------------------------------------

@@ -35,6 +35,8 @@ REFUSED_IN_REPLAY = {
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/save"),
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/restart"),
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/verify"),
+    ("POST", "/api/live/devices/{turbine}/{station}/{device}/order/check"),
+    ("POST", "/api/live/devices/{turbine}/{station}/{device}/order/keep"),
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/motor"),
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/pdos/preview"),
     ("POST", "/api/live/devices/{turbine}/{station}/{device}/pdos/apply"),

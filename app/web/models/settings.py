@@ -7,13 +7,16 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from app.model.site import HEARTBEAT_NODE
+from app.model.slaves import MASTER, MAX_SLAVE
 from app.web.models import Failure
 
 Slug = Annotated[str, Field(max_length=60, pattern=r"^[a-z0-9]+(-[a-z0-9]+)*$")]
 Short = Annotated[str, Field(max_length=200)]
-Bitrate = Annotated[int, Field(ge=10_000, le=1_000_000)]
+Bitrate = Annotated[int, Field(ge=9_600, le=12_000_000)]
+"""On CAN 10 kbit/s to 1 Mbit/s, on PROFIBUS 9.6 kbit/s to 12 Mbit/s: which of them, the connection says."""
 Node = Annotated[int, Field(ge=1, le=247)]
-"""On Modbus TCP up to 247, on CAN up to 127: the site file knows which bus it is."""
+"""On Modbus TCP up to 247, on CAN up to 127, on PROFIBUS up to 126: the site file knows which bus it is."""
+Master = Annotated[int, Field(ge=1, le=MAX_SLAVE)]
 RateName = Literal["fast", "slow", "rare"]
 VerdictName = Literal["listening", "fits", "errors", "silent"]
 HealthName = Literal["ok", "no_driver", "failed", "timed_out", "unsupported"]
@@ -71,13 +74,14 @@ class SearchRequest(BaseModel):
 
 
 class ScanRequest(BaseModel):
-    """``consent``: ask the devices although another master is on the bus."""
+    """``consent``: ask the devices although another master is on the bus. ``master``: our own address on PROFIBUS."""
 
     model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{"connection": "socketcan:can0"}]})
 
     connection: Short
     bitrate: Bitrate = 500_000
     consent: bool = False
+    master: Master = MASTER
 
 
 class IdentifyRequest(BaseModel):
@@ -196,23 +200,26 @@ class BusDoc(BaseModel):
     """A bus of a turbine; ``bitrate`` 0: the connection names it.
 
     ``heartbeat_node``: as whom this tool beats on it while axes are moved. ``connection`` ``modbus-tcp``: its devices
-    have addresses, all within ``ranges``; it has no bit rate (0) then.
+    have addresses, all within ``ranges``; it has no bit rate (0) then. ``profibus:PORT`` is a line of PROFIBUS-DP, on
+    which ``master`` is our own address.
     """
 
     model_config = ConfigDict(extra="forbid")
 
     name: Slug
     connection: Short
-    bitrate: Annotated[int, Field(ge=0, le=1_000_000)]
+    bitrate: Annotated[int, Field(ge=0, le=12_000_000)]
     heartbeat_node: Annotated[int, Field(ge=1, le=127)] = HEARTBEAT_NODE
     ranges: Annotated[list[Annotated[str, Field(max_length=100)]], Field(max_length=64)] = []
+    master: Master = MASTER
 
 
 class SiteDeviceDoc(BaseModel):
     """A device; ``slug`` is its own part of the path.
 
     ``address`` (HOST[:PORT][/UNIT]) is where it listens on Modbus TCP. ``external_stop`` says what stops this axis from
-    outside where its bus cannot prove that it stops by itself; experts change it.
+    outside where its bus cannot prove that it stops by itself; experts change it. ``telegram`` (null: the one it is set
+    to), ``pzd_order`` (``high-high`` and the like, empty: not known), ``gsd`` and ``modules`` are of PROFIBUS-DP.
     """
 
     model_config = ConfigDict(extra="forbid")
@@ -224,6 +231,10 @@ class SiteDeviceDoc(BaseModel):
     node: Node
     address: Short = ""
     external_stop: Short = ""
+    telegram: Annotated[int, Field(ge=1, le=999)] | None = None
+    pzd_order: Annotated[str, Field(max_length=20)] = ""
+    gsd: Short = ""
+    modules: Annotated[list[Short], Field(max_length=64)] = []
 
 
 class SiteStationDoc(BaseModel):
@@ -280,7 +291,7 @@ class DescriptionRef(BaseModel):
 
     id: str
     name: str
-    bus: Literal["canopen", "modbus-tcp"]
+    bus: Literal["canopen", "modbus-tcp", "profibus-dp"]
 
 
 class SiteDoc(BaseModel):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 from collections import Counter
-from typing import Literal
 
 from fastapi import APIRouter
 
@@ -17,6 +16,7 @@ from app.model.description_file import BUILTIN, load_builtin
 from app.model.roles import Role, SignedIn
 from app.model.servers import Server, parse_server
 from app.model.site import MAX_NODE, BusConfig, Device, Turbine
+from app.model.slaves import PROFIBUS, SlaveSetup
 from app.service import about as about_program
 from app.service.adapters import (
     Heard,
@@ -33,6 +33,7 @@ from app.service.adapters import (
 from app.service.bench import Bench
 from app.service.identify import Asked, ask_address
 from app.service.jobs import Job
+from app.service.line_scan import scan_line
 from app.service.polling import PollPlan, Rate, read_bits, usual_list
 from app.service.site_check import changes_a_stop
 from app.service.site_edit import propose, turbine_of
@@ -125,7 +126,11 @@ async def start_search(bench: BenchOf, jobs: JobsOf, request: SearchRequest) -> 
 
 @router.post("/scan", dependencies=[needs(Role.TECHNICIAN)])
 async def start_scan(bench: BenchOf, jobs: JobsOf, request: ScanRequest) -> SettingsJobDoc:
-    """Ask every node of a bus what it is."""
+    """Ask every node of a bus what it is, or every address of a PROFIBUS line."""
+    if request.connection.startswith(PROFIBUS):
+        line = BusConfig("line", request.connection, request.bitrate, master=request.master)
+        stations = [one for one in _known(bench).values() if one.bus is Bus.PROFIBUS_DP]
+        return _job_doc(jobs.start(KINDS[2], "", lambda job: scan_line(job, line, stations, bench.connection)))
     config = configured(request.connection, request.bitrate)
     link = in_use(bench.connection, request.connection)
     known = _known(bench).values()
@@ -300,8 +305,7 @@ def _site_doc(bench: Bench) -> SiteDoc:
 
 
 def _ref(key: str, description: Description) -> DescriptionRef:
-    kind: Literal["canopen", "modbus-tcp"] = "modbus-tcp" if description.bus is Bus.MODBUS_TCP else "canopen"
-    return DescriptionRef(id=key, name=description.name, bus=kind)
+    return DescriptionRef(id=key, name=description.name, bus=description.bus.value)
 
 
 def _turbine_doc(turbine: Turbine) -> SiteTurbineDoc:
@@ -316,6 +320,7 @@ def _turbine_doc(turbine: Turbine) -> SiteTurbineDoc:
                 bitrate=bus.bitrate,
                 heartbeat_node=bus.heartbeat_node,
                 ranges=list(bus.ranges),
+                master=bus.master,
             )
             for bus in turbine.buses
         ],
@@ -333,6 +338,10 @@ def _turbine_doc(turbine: Turbine) -> SiteTurbineDoc:
                         node=device.node,
                         address=device.address,
                         external_stop=device.external_stop,
+                        telegram=device.slave.telegram,
+                        pzd_order=device.slave.pzd_order,
+                        gsd=device.slave.gsd,
+                        modules=list(device.slave.modules),
                     )
                     for device in station.devices
                 ],
@@ -348,7 +357,8 @@ def _turbine(doc: SiteTurbineDoc) -> Turbine:
     for station in doc.stations:
         _once(f"station.{station.slug}.device", [device.slug for device in station.devices])
     buses = [
-        BusConfig(bus.name, bus.connection, bus.bitrate, bus.heartbeat_node, tuple(bus.ranges)) for bus in doc.buses
+        BusConfig(bus.name, bus.connection, bus.bitrate, bus.heartbeat_node, tuple(bus.ranges), bus.master)
+        for bus in doc.buses
     ]
     stations = [
         (
@@ -364,7 +374,8 @@ def _turbine(doc: SiteTurbineDoc) -> Turbine:
 
 def _device(doc: SiteDeviceDoc) -> Device:
     stop = doc.external_stop.strip()
-    return Device(doc.slug, doc.name, doc.description_id, doc.bus, doc.node, doc.address.strip(), stop)
+    slave = SlaveSetup(doc.telegram, doc.pzd_order, doc.gsd.strip(), tuple(doc.modules))
+    return Device(doc.slug, doc.name, doc.description_id, doc.bus, doc.node, doc.address.strip(), stop, slave)
 
 
 def _once(key: str, slugs: list[str]) -> None:

@@ -594,6 +594,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/live/bus/lines": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Bus Lines
+         * @description Each bus as its driver has it: its line, and where it keeps stations, each of them with what is exchanged.
+         */
+        get: operations["bus_lines"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/live/bus/load": {
         parameters: {
             query?: never;
@@ -1290,6 +1310,46 @@ export interface paths {
          * @description Read the motor's parameters of a device over the wire, and add the motor with them.
          */
         post: operations["add_motor_of_device"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/live/devices/{turbine}/{station}/{device}/order/check": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Check Order
+         * @description The guided check of the order of bytes: parameters are read and compared with the process data of that moment.
+         */
+        post: operations["check_order"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/live/devices/{turbine}/{station}/{device}/order/keep": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Keep Order
+         * @description Check once more, and note the order in the site file where nothing contradicts it: for the next connection.
+         */
+        post: operations["keep_order"];
         delete?: never;
         options?: never;
         head?: never;
@@ -3681,7 +3741,7 @@ export interface paths {
         put?: never;
         /**
          * Start Scan
-         * @description Ask every node of a bus what it is.
+         * @description Ask every node of a bus what it is, or every address of a PROFIBUS line.
          */
         post: operations["start_scan"];
         delete?: never;
@@ -4559,7 +4619,8 @@ export interface components {
          * @description A bus of a turbine; ``bitrate`` 0: the connection names it.
          *
          *     ``heartbeat_node``: as whom this tool beats on it while axes are moved. ``connection`` ``modbus-tcp``: its devices
-         *     have addresses, all within ``ranges``; it has no bit rate (0) then.
+         *     have addresses, all within ``ranges``; it has no bit rate (0) then. ``profibus:PORT`` is a line of PROFIBUS-DP, on
+         *     which ``master`` is our own address.
          */
         BusDoc: {
             /** Bitrate */
@@ -4571,6 +4632,11 @@ export interface components {
              * @default 126
              */
             heartbeat_node: number;
+            /**
+             * Master
+             * @default 2
+             */
+            master: number;
             /** Name */
             name: string;
             /**
@@ -5269,7 +5335,7 @@ export interface components {
              * Bus
              * @enum {string}
              */
-            bus: "canopen" | "modbus-tcp";
+            bus: "canopen" | "modbus-tcp" | "profibus-dp";
             /** Id */
             id: string;
             /** Name */
@@ -5320,6 +5386,24 @@ export interface components {
             slug: string;
             /** Verifies */
             verifies: boolean;
+        };
+        /**
+         * DiagnosisDoc
+         * @description The latest Slave_Diag. ``data`` are its bytes; ``master`` null: none has parametrised it.
+         *
+         *     ``status`` are the names of the bits that are set, as text keys; ``blocks`` the extended diagnosis in words.
+         */
+        DiagnosisDoc: {
+            /** Blocks */
+            blocks: components["schemas"]["SaidDoc"][];
+            /** Data */
+            data: string;
+            /** Ident */
+            ident: number;
+            /** Master */
+            master: number | null;
+            /** Status */
+            status: string[];
         };
         /**
          * DraftIn
@@ -6690,6 +6774,47 @@ export interface components {
             version: string;
         };
         /**
+         * LineDoc
+         * @description A bus of the connection as its driver has it. ``bitrate`` 0: it has none; ``load`` 0..1.
+         *
+         *     ``master`` is our own address where the bus has one. ``stations`` are empty where its driver keeps none.
+         */
+        LineDoc: {
+            /** Bitrate */
+            bitrate: number;
+            /** Bus */
+            bus: string;
+            /** Connection */
+            connection: string;
+            /** Dropped */
+            dropped: number;
+            /** Frames */
+            frames: number;
+            /**
+             * Kind
+             * @enum {string}
+             */
+            kind: "canopen" | "modbus-tcp" | "profibus-dp";
+            /** Load */
+            load: number;
+            /** Master */
+            master: number | null;
+            problem: components["schemas"]["Failure"] | null;
+            /** Reason */
+            reason: string;
+            /** Reconnects */
+            reconnects: number;
+            /** Since T Ns */
+            since_t_ns: number;
+            /**
+             * State
+             * @enum {string}
+             */
+            state: "closed" | "listening" | "connected" | "lost";
+            /** Stations */
+            stations: components["schemas"]["StationDoc"][];
+        };
+        /**
          * LinkLine
          * @description The connection as a whole. With several buses: the state of the worst one, and the highest load.
          */
@@ -7590,6 +7715,58 @@ export interface components {
          * @enum {string}
          */
         Order: "before" | "then" | "without";
+        /**
+         * OrderCheckDoc
+         * @description What the guided check found. ``fits`` are the orders that nothing contradicts, ``setting`` what the site says.
+         *
+         *     ``proven`` null: nothing but zeros may be sent, for the reason of ``reason_key``.
+         */
+        OrderCheckDoc: {
+            /** Fits */
+            fits: ("low-low" | "low-high" | "high-low" | "high-high")[];
+            /** Proven */
+            proven: ("low-low" | "low-high" | "high-low" | "high-high") | null;
+            /** Readings */
+            readings: components["schemas"]["OrderReadingDoc"][];
+            /** Reason Key */
+            reason_key: string | null;
+            /** Setting */
+            setting: ("low-low" | "low-high" | "high-low" | "high-high") | null;
+        };
+        /**
+         * OrderKept
+         * @description The order of bytes that the site file is to name.
+         * @example {
+         *       "order": "high-high"
+         *     }
+         */
+        OrderKept: {
+            /**
+             * Order
+             * @enum {string}
+             */
+            order: "low-low" | "low-high" | "high-low" | "high-high";
+        };
+        /**
+         * OrderReadingDoc
+         * @description One parameter of the check: ``value`` as PKW read it, ``data`` its process data of that moment.
+         *
+         *     ``said`` is what the bytes tell by each order.
+         */
+        OrderReadingDoc: {
+            /** Address */
+            address: string | null;
+            /** Data */
+            data: string;
+            /** Said */
+            said: {
+                [key: string]: number;
+            };
+            /** Signal */
+            signal: string;
+            /** Value */
+            value: number;
+        };
         /**
          * OrderRequest
          * @description An order to an axis; ``order`` rises with each one of a page, so that an old one does nothing.
@@ -9339,6 +9516,18 @@ export interface components {
             took_ms: number;
         };
         /**
+         * SaidDoc
+         * @description A text and what fills its placeholders.
+         */
+        SaidDoc: {
+            /** Details */
+            details: {
+                [key: string]: unknown;
+            };
+            /** Text Key */
+            text_key: string;
+        };
+        /**
          * Same
          * @description What both sides of a pair must have in common.
          * @enum {string}
@@ -9401,7 +9590,7 @@ export interface components {
         };
         /**
          * ScanRequest
-         * @description ``consent``: ask the devices although another master is on the bus.
+         * @description ``consent``: ask the devices although another master is on the bus. ``master``: our own address on PROFIBUS.
          * @example {
          *       "connection": "socketcan:can0"
          *     }
@@ -9419,6 +9608,11 @@ export interface components {
              * @default false
              */
             consent: boolean;
+            /**
+             * Master
+             * @default 2
+             */
+            master: number;
         };
         /**
          * ScenarioDoc
@@ -9930,6 +10124,22 @@ export interface components {
          */
         SignKind: "emcy" | "emcy_reset" | "error_code" | "boot_up" | "nmt_command" | "write_aborted" | "parameter_written" | "gap" | "axis_fault" | "axis_warning" | "axis_enabled" | "quick_stop" | "remote_lost" | "internal_limit" | "following_error" | "efc_command" | "efc_input" | "enable_input" | "limit_switch" | "feather_switch" | "watchdog_open" | "chain_open" | "relay_open" | "pmm_fault" | "pmm_warning" | "battery_fault" | "battery_test" | "on_battery" | "mains_high" | "mains_phase" | "mains_low" | "booster" | "hold_up_over" | "device_status" | "limit" | "silent" | "not_operational";
         /**
+         * SignalDoc
+         * @description One signal of process data; ``address`` is the parameter of the same value, null where there is none.
+         *
+         *     ``raw`` null: the order of bytes is not proven, so nobody knows what they tell.
+         */
+        SignalDoc: {
+            /** Address */
+            address: string | null;
+            /** Name */
+            name: string;
+            /** Number */
+            number: number;
+            /** Raw */
+            raw: number | null;
+        };
+        /**
          * SignalLine
          * @description One object of a device that is a number, as it was seen in the recording.
          *
@@ -10200,7 +10410,8 @@ export interface components {
          * @description A device; ``slug`` is its own part of the path.
          *
          *     ``address`` (HOST[:PORT][/UNIT]) is where it listens on Modbus TCP. ``external_stop`` says what stops this axis from
-         *     outside where its bus cannot prove that it stops by itself; experts change it.
+         *     outside where its bus cannot prove that it stops by itself; experts change it. ``telegram`` (null: the one it is set
+         *     to), ``pzd_order`` (``high-high`` and the like, empty: not known), ``gsd`` and ``modules`` are of PROFIBUS-DP.
          */
         SiteDeviceDoc: {
             /**
@@ -10217,12 +10428,29 @@ export interface components {
              * @default
              */
             external_stop: string;
+            /**
+             * Gsd
+             * @default
+             */
+            gsd: string;
+            /**
+             * Modules
+             * @default []
+             */
+            modules: string[];
             /** Name */
             name: string;
             /** Node */
             node: number;
+            /**
+             * Pzd Order
+             * @default
+             */
+            pzd_order: string;
             /** Slug */
             slug: string;
+            /** Telegram */
+            telegram?: number | null;
         };
         /**
          * SiteDoc
@@ -10366,6 +10594,39 @@ export interface components {
             values: number;
         };
         /**
+         * StationDoc
+         * @description One station. ``state`` null: the line is gone, so nothing is known of it.
+         *
+         *     ``dp_state`` and ``watchdog_state`` null: it has not told. ``order`` is the order of bytes that is proven,
+         *     ``setting`` what the site says. ``age_ms`` is that of the latest inputs that were surely of now, null where there
+         *     were none since it is there; ``starts`` counts how often it has begun to exchange data.
+         */
+        StationDoc: {
+            /** Age Ms */
+            age_ms: number | null;
+            /** Device */
+            device: string;
+            diagnosis: components["schemas"]["DiagnosisDoc"] | null;
+            /** Dp State */
+            dp_state: ("wait_prm" | "wait_cfg" | "data_exchange") | null;
+            /** Node */
+            node: number;
+            /** Order */
+            order: ("low-low" | "low-high" | "high-low" | "high-high") | null;
+            problem: components["schemas"]["Failure"] | null;
+            /** Setting */
+            setting: ("low-low" | "low-high" | "high-low" | "high-high") | null;
+            /** Stale */
+            stale: boolean;
+            /** Starts */
+            starts: number;
+            /** State */
+            state: ("absent" | "starting" | "exchanging") | null;
+            telegram: components["schemas"]["TelegramDoc"] | null;
+            /** Watchdog State */
+            watchdog_state: ("baud_control" | "dp_control") | null;
+        };
+        /**
          * StationFindings
          * @description One station: the devices that were judged together, and the findings, the gravest first.
          */
@@ -10493,6 +10754,24 @@ export interface components {
              * @enum {string}
              */
             tag: "as-delivered" | "golden" | "as-found" | "as-left";
+        };
+        /**
+         * TelegramDoc
+         * @description The telegram type that is exchanged. Sizes in bytes, PKW included; ``received`` is what the slave gets.
+         */
+        TelegramDoc: {
+            /** Has Pkw */
+            has_pkw: boolean;
+            /** Input Size */
+            input_size: number;
+            /** Number */
+            number: number;
+            /** Output Size */
+            output_size: number;
+            /** Received */
+            received: components["schemas"]["WordDoc"][];
+            /** Sent */
+            sent: components["schemas"]["WordDoc"][];
         };
         /**
          * TestRecord
@@ -11321,6 +11600,20 @@ export interface components {
             person: string;
             /** Started Ns */
             started_ns: number;
+        };
+        /**
+         * WordDoc
+         * @description ``words`` words of process data from ``word`` (from 1) on, and what shares them. ``data`` empty: none yet.
+         */
+        WordDoc: {
+            /** Data */
+            data: string;
+            /** Signals */
+            signals: components["schemas"]["SignalDoc"][];
+            /** Word */
+            word: number;
+            /** Words */
+            words: number;
         };
         /**
          * WordsDoc
@@ -13823,6 +14116,62 @@ export interface operations {
             };
             /** @description Forbidden */
             403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    bus_lines: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["LineDoc"][];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Conflict */
+            409: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -17197,6 +17546,230 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["MotorDoc"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Conflict */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Bad Gateway */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Service Unavailable */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Gateway Timeout */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    check_order: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                turbine: string;
+                station: string;
+                device: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /** @example {} */
+                "application/json": components["schemas"]["Nothing"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["OrderCheckDoc"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Conflict */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Bad Gateway */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Service Unavailable */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Gateway Timeout */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    keep_order: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                turbine: string;
+                station: string;
+                device: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "order": "high-high"
+                 *     }
+                 */
+                "application/json": components["schemas"]["OrderKept"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["OrderCheckDoc"];
                 };
             };
             /** @description Unauthorized */

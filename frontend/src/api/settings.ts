@@ -127,8 +127,8 @@ export const settings = {
   test: (connection: string, bitrate: number, sure: boolean) =>
     send<SettingsJob>("POST", `${ROOT}/adapters/test`, { connection, bitrate, sure }),
   search: (connection: string) => send<SettingsJob>("POST", `${ROOT}/adapters/bitrate`, { connection }),
-  scan: (connection: string, bitrate: number, consent: boolean) =>
-    send<SettingsJob>("POST", `${ROOT}/scan`, { connection, bitrate, consent }),
+  scan: ({ connection, bitrate, master }: SiteBus, consent: boolean) =>
+    send<SettingsJob>("POST", `${ROOT}/scan`, { connection, bitrate: bitrate || undefined, consent, master }),
   identify: (address: string) => send<SettingsJob>("POST", `${ROOT}/identify`, { address }),
   addTurbine: (revision: string, turbine: SiteTurbine) =>
     send<Site>("POST", `${ROOT}/site/turbines`, { revision, turbine }),

@@ -74,6 +74,12 @@ export interface QuantityDoc {
   decimals: number;
 }
 
+/** What is in force by the raw value of another object. */
+export interface RuleDoc<T> {
+  address: string;
+  choices: Record<string, T>;
+}
+
 export interface EntryDoc extends QuantityDoc {
   address: string;
   name: string;
@@ -97,6 +103,14 @@ export interface EntryDoc extends QuantityDoc {
   maximum: LimitDoc | null;
   /** Values allowed beyond the limits. */
   also: number[];
+  /** Replace names, bits and limits while the object that they name holds one of these raw values. */
+  enumeration_from: RuleDoc<string> | null;
+  bits_from: RuleDoc<string> | null;
+  limits_from: RuleDoc<{ minimum: LimitDoc | null; maximum: LimitDoc | null }> | null;
+  /** A raw value is a multiple of it. */
+  step: number;
+  /** The only raw values; empty: any within the limits. */
+  only: number[];
   enumeration: string | null;
   bits: string | null;
   restore: "copy" | "unit" | "factory" | "network" | "never";

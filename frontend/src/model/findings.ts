@@ -83,8 +83,8 @@ function fitsNow({ address, raw }: Change, ground: Ground, lookup: Lookup): bool
   );
 }
 
-/** Conditions of a write of `raw` that are known not to hold. */
-const unmet = (entry: EntryDoc, raw: Change["raw"], lookup: Lookup) =>
+/** Conditions of a write of `raw` that are known not to hold; with null those of any write. */
+export const unmet = (entry: EntryDoc, raw: Change["raw"] | null, lookup: Lookup) =>
   entry.requires.filter(({ address, values, writing = [] }) => {
     if (writing.length > 0 && !(typeof raw === "number" && writing.includes(raw))) return false;
     const found = lookup(address);

@@ -2,7 +2,7 @@
 import type { DescriptionDoc, EntryDoc, Raw } from "../api/types";
 import type { Translate } from "../texts/texts";
 import { setBits } from "./bits";
-import { type Limits, type Lookup, limitsOf, ownLimitsOf, quantityOf, show } from "./values";
+import { inForce, type Limits, type Lookup, limitsOf, ownLimitsOf, quantityOf, show } from "./values";
 
 export interface Shown {
   text: string;
@@ -20,7 +20,8 @@ export interface DeviceContext {
   t: Translate;
 }
 
-export function shownOf(entry: EntryDoc, raw: Raw, { doc, lookup, t }: DeviceContext): Shown {
+export function shownOf(described: EntryDoc, raw: Raw, { doc, lookup, t }: DeviceContext): Shown {
+  const entry = inForce(described, lookup);
   const text = show(entry, raw, lookup, t.language);
   if (typeof raw === "string") return { text, unit: "", names: [] };
   const named = entry.enumeration === null ? undefined : enumName(doc, entry.enumeration, raw);
@@ -46,6 +47,7 @@ export function limitText(entry: EntryDoc, context: DeviceContext, all: boolean)
   if (limits.low === null && limits.high === null) return "";
   const side = (raw: number | null) =>
     raw === null ? "–" : show(entry, raw, context.lookup, context.t.language);
+  if (entry.only.length > 0) return entry.only.map(side).join(", ");
   const also = entry.also.map((raw) => `, ${side(raw)}`).join("");
   return `${side(limits.low)} … ${side(limits.high)}${also}`;
 }

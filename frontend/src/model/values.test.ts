@@ -1,7 +1,19 @@
 import { describe, expect, it } from "vitest";
 import type { DescriptionDoc, EntryDoc } from "../api/types";
 import { fieldMax, fieldOf, setBits, withField } from "./bits";
-import { defaultOf, limitsOf, type Lookup, Misfit, parse, quantityOf, show } from "./values";
+import {
+  defaultOf,
+  inForce,
+  limitsOf,
+  type Lookup,
+  Misfit,
+  misfitOf,
+  ownLimitsOf,
+  parse,
+  quantityOf,
+  restsOn,
+  show,
+} from "./values";
 
 const PLAIN: EntryDoc = {
   address: "3110:01",
@@ -39,6 +51,11 @@ const PLAIN: EntryDoc = {
   origin: null,
   motion: false,
   also: [],
+  enumeration_from: null,
+  bits_from: null,
+  limits_from: null,
+  step: 1,
+  only: [],
   hexadecimal: false,
   ipv4: false,
   pdo: false,
@@ -260,5 +277,49 @@ describe("bits", () => {
 
   it("names the bits that are set", () => {
     expect(setBits(UNSIGNED32, 0b101, [bit(0), bit(1), bit(2)]).map((one) => one.bit)).toEqual([0, 2]);
+  });
+});
+
+describe("what rests on the value of another object", () => {
+  const ruled: EntryDoc = {
+    ...PLAIN,
+    minimum: 0,
+    maximum: 9,
+    enumeration: "all",
+    bits: null,
+    enumeration_from: { address: "1/22", choices: { "67": "analog" } },
+    limits_from: { address: "1/22", choices: { "67": { minimum: 100, maximum: 200 } } },
+  };
+  const of = (raw: number | null) => (address: string) => (address === "1/22" ? raw : null);
+
+  it("is what that value chooses", () => {
+    expect(inForce(ruled, of(67))).toMatchObject({ enumeration: "analog", minimum: 100, maximum: 200 });
+    expect(ownLimitsOf(ruled, of(67))).toEqual({ low: 100, high: 200 });
+  });
+
+  it("is what holds in all cases where that value is unknown or chooses nothing", () => {
+    expect(inForce(ruled, of(null))).toMatchObject({ enumeration: "all", minimum: 0, maximum: 9 });
+    expect(ownLimitsOf(ruled, of(64))).toEqual({ low: 0, high: 9 });
+  });
+
+  it("is told as what the object rests on", () => {
+    expect(restsOn(ruled)).toEqual(["1/22"]);
+    expect(inForce(PLAIN, of(67))).toBe(PLAIN);
+  });
+});
+
+describe("raw values that there are", () => {
+  const doc = { enumerations: {} } as unknown as DescriptionDoc;
+  const why = (entry: EntryDoc, raw: number) => misfitOf(doc, entry, raw, () => null);
+  const open: EntryDoc = { ...PLAIN, minimum: null, maximum: null, enumeration: null };
+
+  it("are multiples of the step", () => {
+    expect(why({ ...open, step: 2 }, 4)).toBeNull();
+    expect(why({ ...open, step: 2 }, 5)).toBe(Misfit.Resolution);
+  });
+
+  it("are those of the list", () => {
+    expect(why({ ...open, only: [20, 25] }, 25)).toBeNull();
+    expect(why({ ...open, only: [20, 25] }, 21)).toBe(Misfit.NotListed);
   });
 });

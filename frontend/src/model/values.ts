@@ -2,7 +2,7 @@
  * The three forms of a value: raw (as the object holds it), scaled (number with a unit), shown (text).
  * The same readings as the server's, so that what is typed here is refused here; the server decides all the same.
  */
-import type { DescriptionDoc, EntryDoc, Language, LimitDoc, QuantityDoc, Raw } from "../api/types";
+import type { DescriptionDoc, EntryDoc, Language, LimitDoc, QuantityDoc, Raw, RuleDoc } from "../api/types";
 import { divide, type Fraction, fraction, fractionOf, times, toFixed, toNumber, wholeOf } from "./decimal";
 
 /** Latest known raw value of another object of the device. */
@@ -112,8 +112,26 @@ export interface Limits {
   high: number | null;
 }
 
+/** Names, bits and limits as other objects have them now; where those are not known, what holds in all cases. */
+export function inForce(entry: EntryDoc, lookup: Lookup): EntryDoc {
+  const { enumeration_from: names, bits_from: bits, limits_from: limits } = entry;
+  if (names === null && bits === null && limits === null) return entry;
+  return {
+    ...entry,
+    enumeration: chosen(names, lookup) ?? entry.enumeration,
+    bits: chosen(bits, lookup) ?? entry.bits,
+    ...chosen(limits, lookup),
+  };
+}
+
+function chosen<T>(rule: RuleDoc<T> | null, lookup: Lookup): T | undefined {
+  const found = rule === null ? null : lookup(rule.address);
+  return typeof found === "number" ? rule?.choices[String(found)] : undefined;
+}
+
 /** Raw limits in force, those of the data type included; a limit that rests on an unknown object is left out. */
-export function limitsOf(entry: EntryDoc, lookup: Lookup): Limits {
+export function limitsOf(described: EntryDoc, lookup: Lookup): Limits {
+  const entry = inForce(described, lookup);
   const [typeLow, typeHigh] = entry.range ?? [null, null];
   return {
     low: tighter(resolve(entry.minimum, lookup), typeLow, Math.max),
@@ -122,7 +140,8 @@ export function limitsOf(entry: EntryDoc, lookup: Lookup): Limits {
 }
 
 /** Limits that the description itself sets, for the table: those of the data type alone tell nobody anything. */
-export function ownLimitsOf(entry: EntryDoc, lookup: Lookup): Limits {
+export function ownLimitsOf(described: EntryDoc, lookup: Lookup): Limits {
+  const entry = inForce(described, lookup);
   return { low: resolve(entry.minimum, lookup), high: resolve(entry.maximum, lookup) };
 }
 
@@ -185,18 +204,24 @@ export function misfitOf(doc: DescriptionDoc, entry: EntryDoc, raw: Raw, lookup:
     : limitsOf(entry, lookup);
   if (low !== null && Number(raw) < low) return Misfit.BelowLimit;
   if (high !== null && Number(raw) > high) return Misfit.AboveLimit;
-  const table = entry.enumeration === null ? undefined : doc.enumerations[entry.enumeration];
+  if (entry.only.length > 0 && !entry.only.includes(Number(raw))) return Misfit.NotListed;
+  if (entry.step > 1 && Number(raw) % entry.step !== 0) return Misfit.Resolution;
+  const { enumeration } = inForce(entry, lookup);
+  const table = enumeration === null ? undefined : doc.enumerations[enumeration];
   if (table?.exclusive && !table.values.some((one) => one.value === raw)) return Misfit.NotListed;
   return null;
 }
 
-/** Addresses of the objects that unit, limits and preconditions of an entry rest on. */
+/** Addresses of the objects that unit, names, limits and preconditions of an entry rest on. */
 export function restsOn(entry: EntryDoc): string[] {
+  const rules = [entry.limits_from, entry.enumeration_from, entry.bits_from].flatMap(
+    (rule) => rule?.address ?? [],
+  );
   const limits = [entry.minimum, entry.maximum].flatMap((limit) =>
     limit !== null && typeof limit === "object" ? [limit.address] : [],
   );
   const unit = entry.unit_from === null ? [] : [entry.unit_from.address, entry.unit_from.shaft];
-  const found = [...limits, ...unit, ...entry.requires.map((one) => one.address)];
+  const found = [...limits, ...rules, ...unit, ...entry.requires.map((one) => one.address)];
   return [...new Set(found.filter((address): address is string => address !== null))];
 }
 

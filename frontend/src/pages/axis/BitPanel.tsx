@@ -2,6 +2,7 @@ import { memo } from "react";
 import type { BitDoc } from "../../api/types";
 import { fieldMax, fieldOf } from "../../model/bits";
 import type { DeviceContext } from "../../model/shown";
+import { inForce } from "../../model/values";
 import { useTexts } from "../../texts/texts";
 import { ReadingText } from "../../ui/ReadingText";
 import { entriesOf, type Pace, useReading } from "../../ui/reading";
@@ -17,7 +18,8 @@ interface Props {
 /** A word of bits by name and clamp: a full mark is set, an empty one is not, a dash is not known. */
 export function BitPanel({ title, context, address, pace }: Props) {
   const reading = useReading(context, address, pace);
-  const entry = context ? entriesOf(context.doc).get(address) : undefined;
+  const described = context ? entriesOf(context.doc).get(address) : undefined;
+  const entry = context && described ? inForce(described, context.lookup) : undefined;
   // A device that has no such object has no such card.
   if (context && !entry) return null;
   const table = entry?.bits ? (context?.doc.bit_tables[entry.bits] ?? []) : [];

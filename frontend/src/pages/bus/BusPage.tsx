@@ -7,6 +7,7 @@ import classes from "./Bus.module.css";
 import { EmcyLog } from "./EmcyLog";
 import { NO_VIEW } from "./filter";
 import { IdentifierTable } from "./IdentifierTable";
+import { LineView } from "./LineView";
 import { LoadView } from "./LoadView";
 import { NodeTable } from "./NodeTable";
 import { SdoLog } from "./SdoLog";
@@ -19,6 +20,7 @@ const VIEWS = {
   sdo: SdoLog,
   emcy: EmcyLog,
   load: LoadView,
+  line: LineView,
 };
 type ViewName = keyof typeof VIEWS;
 

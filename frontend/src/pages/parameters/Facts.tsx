@@ -1,10 +1,11 @@
 import { useQueries } from "@tanstack/react-query";
-import { IconQuestionMark } from "@tabler/icons-react";
+import { IconAlertTriangle, IconQuestionMark } from "@tabler/icons-react";
 import type { EntryDoc } from "../../api/types";
+import { unmet } from "../../model/findings";
 import { type ParameterRow, titleOf } from "../../model/rows";
 import { categoryName } from "../../model/saving";
-import { limitText } from "../../model/shown";
-import { isHex, quantityOf, restsOn } from "../../model/values";
+import { limitText, lineOf, shownOf } from "../../model/shown";
+import { isHex, quantityOf, restsOn, show } from "../../model/values";
 import { useBenchOfTable, useDevice } from "./context";
 import { detailsOf, historyQuery } from "./history";
 import classes from "./Parameters.module.css";
@@ -39,10 +40,13 @@ export function Facts({ row, onOpen }: Props) {
     return writing.length > 0 ? `${writing.map(String).join(", ")}: ${need}` : need;
   });
   if (needs.length > 0) facts.push(["requires", needs.join("; ")]);
+  if (entry.step > 1)
+    facts.splice(1, 0, ["step", `${show(entry, entry.step, device.lookup, t.language)} ${unit}`.trim()]);
   return (
     <div className={classes.facts}>
       {entry.note !== null && <p>{t(entry.note)}</p>}
       {entry.inferred && <Inferred entry={entry} />}
+      <Unmet entry={entry} />
       <dl>
         {facts.map(([name, text]) => (
           <div key={name} data-testid={`entry-${name}`}>
@@ -56,6 +60,30 @@ export function Facts({ row, onOpen }: Props) {
       <History entry={entry} />
     </div>
   );
+}
+
+/** Why the object cannot be written at present: what it needs, and what there is. */
+function Unmet({ entry }: { entry: EntryDoc }) {
+  const device = useDevice();
+  const { t, doc, lookup } = device;
+  const inWords = (address: string, raw: number) => {
+    const other = entriesOf(doc).get(address);
+    return other ? lineOf(shownOf(other, raw, device)) : String(raw);
+  };
+  return unmet(entry, null, lookup).map(({ address, values }) => {
+    const other = entriesOf(doc).get(address);
+    const details = {
+      name: `${address} ${other ? titleOf(other, t) : ""}`.trim(),
+      found: inWords(address, Number(lookup(address))),
+      values: values.map((raw) => inWords(address, raw)).join(", "),
+    };
+    return (
+      <p key={address} className={`${classes.inferred} tone-warning`} data-testid={`unmet-${address}`}>
+        <IconAlertTriangle size={15} aria-hidden />
+        <span>{t("lines.unmet", details)}</span>
+      </p>
+    );
+  });
 }
 
 /** What the device's own manual does not print of the object, and what tells it instead. */

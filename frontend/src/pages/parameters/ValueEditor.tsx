@@ -2,11 +2,12 @@ import { Checkbox, NumberInput, Select, Stack, Text, TextInput } from "@mantine/
 import { type KeyboardEvent, useState } from "react";
 import type { BitDoc, EntryDoc } from "../../api/types";
 import { fieldMax, fieldOf, withField } from "../../model/bits";
-import { hexadecimal, isHex, isInteger, quantityOf } from "../../model/values";
+import { hexadecimal, inForce, isHex, isInteger, quantityOf } from "../../model/values";
 import { errorCode } from "../../ui/format";
 import { useDevice } from "./context";
 import type { Draft } from "./draft";
 import classes from "./Parameters.module.css";
+import { plannedContext } from "./staging";
 
 interface Props {
   entry: EntryDoc;
@@ -14,9 +15,12 @@ interface Props {
   draft: Draft;
 }
 
-export function ValueEditor(props: Props) {
-  const { doc } = useDevice();
-  const { entry } = props;
+export function ValueEditor(given: Props) {
+  const device = useDevice();
+  const { doc } = device;
+  // Names and bits as they will be once what is pending is written.
+  const entry = inForce(given.entry, plannedContext(device).lookup);
+  const props = { ...given, entry };
   if (entry.enumeration !== null && doc.enumerations[entry.enumeration]) return <EnumEditor {...props} />;
   const table = entry.bits === null ? undefined : doc.bit_tables[entry.bits];
   if (table) return <BitsEditor {...props} table={table} />;

@@ -52,7 +52,7 @@ function refusal(parsed: Parsed, text: string, entry: EntryDoc, context: DeviceC
 
 function stepText(entry: EntryDoc, context: DeviceContext): string {
   if (!isInteger(entry)) return "";
-  return show({ ...entry, hexadecimal: false, bits: null }, 1, context.lookup, context.t.language);
+  return show({ ...entry, hexadecimal: false, bits: null }, entry.step, context.lookup, context.t.language);
 }
 
 function hintOf(entry: EntryDoc, context: DeviceContext): string {
@@ -67,8 +67,15 @@ function stepped(entry: EntryDoc, device: DeviceContext, text: string, direction
   const context = plannedContext(device);
   const parsed = parse(device.doc, entry, text, context.lookup);
   if (!parsed.ok || typeof parsed.raw !== "number" || !isInteger(entry)) return text;
-  const next = show(entry, parsed.raw + direction, context.lookup, context.t.language);
+  const next = show(entry, nextOf(entry, parsed.raw, direction), context.lookup, context.t.language);
   return parse(device.doc, entry, next, context.lookup).ok ? next : text;
+}
+
+/** The raw value after this one: the next of those that there are, or one step on. */
+function nextOf(entry: EntryDoc, raw: number, direction: 1 | -1): number {
+  if (entry.only.length === 0) return raw + direction * entry.step;
+  const sorted = entry.only.toSorted((a, b) => a - b);
+  return sorted[sorted.indexOf(raw) + direction] ?? raw;
 }
 
 /** A plain number may be edited in the table; bits, names, texts and octets need the panel. */

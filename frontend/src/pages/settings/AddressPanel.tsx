@@ -23,6 +23,7 @@ import {
   serverOf,
   serverText,
 } from "./modbusDraft";
+import { NO_SLAVE } from "./profibusDraft";
 import classes from "./Settings.module.css";
 import { withDevice } from "./siteDraft";
 import { type StartedJob, useSettingsJob } from "./useSettingsJob";
@@ -195,6 +196,7 @@ function NewDevice({ server, found, bus, draft, descriptions, onAdded }: NewProp
     bus: bus.name,
     address: serverText(server),
     external_stop: "",
+    ...NO_SLAVE,
   };
   return (
     <div className={classes.row} style={{ alignItems: "flex-end" }} data-testid="new-device">

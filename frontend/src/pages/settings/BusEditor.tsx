@@ -4,9 +4,10 @@ import { useState } from "react";
 import { type Site, type SiteBus, type SiteTurbine } from "../../api/settings";
 import { useTexts } from "../../texts/texts";
 import { AddressPanel } from "./AddressPanel";
-import { CanFields, RangeFields } from "./BusFields";
+import { CanFields, LineFields, RangeFields } from "./BusFields";
 import { useFlaw } from "./flaws";
 import { asModbus, isModbus } from "./modbusDraft";
+import { asProfibus, type BusKind, kindOf, portOf } from "./profibusDraft";
 import { ScanPanel } from "./ScanPanel";
 import classes from "./Settings.module.css";
 import { NEW_BUS } from "./siteDraft";
@@ -48,7 +49,7 @@ export function BusEditor({ site, draft, before, onChange }: Props) {
               key={bus.connection}
               bus={bus}
               draft={draft}
-              descriptions={site.descriptions.filter((one) => one.bus === "canopen")}
+              descriptions={site.descriptions.filter((one) => one.bus === kindOf(bus))}
               onTaken={onChange}
             />
           )}
@@ -97,7 +98,13 @@ function BusRow({ bus, fixed, onChange, onRemove, scanning, onScan }: RowProps) 
   const connectionFlaw = useFlaw(`${at}.connection`);
   const rangesFlaw = useFlaw(`${at}.ranges`);
   const tcp = isModbus(bus);
-  const incomplete = tcp ? bus.ranges.length === 0 || rangesFlaw !== undefined : bus.connection === "";
+  const kind = kindOf(bus);
+  const Fields = FIELDS[kind];
+  const incomplete = {
+    canopen: bus.connection === "",
+    "modbus-tcp": bus.ranges.length === 0 || rangesFlaw !== undefined,
+    "profibus-dp": portOf(bus) === "",
+  }[kind];
   return (
     <div className={classes.row} style={{ alignItems: "flex-start" }}>
       <TextInput
@@ -113,15 +120,16 @@ function BusRow({ bus, fixed, onChange, onRemove, scanning, onScan }: RowProps) 
         w={136}
         label={t("page.settings.modbus.kind")}
         data={[
-          { value: "can", label: t("page.settings.modbus.can") },
-          { value: "tcp", label: t("page.settings.modbus.tcp") },
+          { value: "canopen", label: t("page.settings.modbus.can") },
+          { value: "modbus-tcp", label: t("page.settings.modbus.tcp") },
+          { value: "profibus-dp", label: t("lines.kind.profibus-dp") },
         ]}
-        value={tcp ? "tcp" : "can"}
+        value={kind}
         allowDeselect={false}
-        onChange={(kind) => onChange(ofKind(bus, kind === "tcp", fixed))}
+        onChange={(wanted) => wanted !== null && onChange(ofKind(bus, wanted, fixed))}
         data-testid={`bus-kind-${bus.name}`}
       />
-      {tcp ? <RangeFields bus={bus} onChange={onChange} /> : <CanFields bus={bus} onChange={onChange} />}
+      <Fields bus={bus} onChange={onChange} />
       <Button
         mt={22}
         variant={scanning ? "filled" : "default"}
@@ -146,9 +154,15 @@ function BusRow({ bus, fixed, onChange, onRemove, scanning, onScan }: RowProps) 
   );
 }
 
-/** The bus as one of the other kind; the name stays where it is permanent. */
-function ofKind(bus: SiteBus, tcp: boolean, fixed: boolean): SiteBus {
-  if (tcp === isModbus(bus)) return bus;
-  const other = tcp ? asModbus(bus) : { name: bus.name, ...NEW_BUS };
-  return fixed ? { ...other, name: bus.name } : other;
+const FIELDS = { canopen: CanFields, "modbus-tcp": RangeFields, "profibus-dp": LineFields };
+
+/** The bus as one of another kind; the name stays where it is permanent. */
+function ofKind(bus: SiteBus, kind: BusKind, fixed: boolean): SiteBus {
+  if (kind === kindOf(bus)) return bus;
+  const made = {
+    canopen: (): SiteBus => ({ name: bus.name, ...NEW_BUS }),
+    "modbus-tcp": () => asModbus(bus),
+    "profibus-dp": () => asProfibus(bus),
+  }[kind]();
+  return fixed ? { ...made, name: bus.name } : made;
 }

@@ -1,10 +1,12 @@
-import { Autocomplete, NumberInput, Select, TagsInput, Tooltip } from "@mantine/core";
+import { Autocomplete, NumberInput, Select, TagsInput, TextInput, Tooltip } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { adaptersQuery, type SiteBus } from "../../api/settings";
-import { useTexts } from "../../texts/texts";
+import { figure } from "../../model/values";
+import { type Translate, useTexts } from "../../texts/texts";
 import { typedNumber } from "../../ui/typedNumber";
 import { kbit } from "./AdaptersSection";
 import { useFlaw } from "./flaws";
+import { LAST_SLAVE, LINE_RATES, portOf, PROFIBUS } from "./profibusDraft";
 
 const RATES = [10_000, 20_000, 50_000, 125_000, 250_000, 500_000, 800_000, 1_000_000];
 
@@ -87,6 +89,56 @@ export function RangeFields({ bus, onChange }: Props) {
     />
   );
 }
+
+/** How a PROFIBUS line is reached: serial port, bit rate, and our own address on it. */
+export function LineFields({ bus, onChange }: Props) {
+  const t = useTexts();
+  const at = `bus.${bus.name}`;
+  const portFlaw = useFlaw(`${at}.connection`);
+  const bitrateFlaw = useFlaw(`${at}.bitrate`);
+  const masterFlaw = useFlaw(`${at}.master`);
+  return (
+    <>
+      <TextInput
+        style={{ flex: "1 1 200px" }}
+        label={t("lines.site.port")}
+        placeholder="/dev/ttyUSB0"
+        value={portOf(bus)}
+        error={portFlaw}
+        onChange={(event) => onChange({ ...bus, connection: `${PROFIBUS}${event.currentTarget.value}` })}
+        data-testid="line-port"
+      />
+      <Select
+        w={140}
+        label={t("page.settings.adapters.bitrate")}
+        data={LINE_RATES.map((rate) => ({ value: String(rate), label: rateLabel(rate, t) }))}
+        value={String(bus.bitrate)}
+        error={bitrateFlaw}
+        allowDeselect={false}
+        onChange={(text) => onChange({ ...bus, bitrate: Number(text) })}
+        data-testid="line-rate"
+      />
+      <Tooltip label={t("lines.site.master_explain")} multiline w={280}>
+        <NumberInput
+          w={104}
+          label={t("lines.site.master")}
+          value={bus.master}
+          error={masterFlaw}
+          min={1}
+          max={LAST_SLAVE}
+          allowDecimal={false}
+          clampBehavior="strict"
+          onChange={(value) => typedNumber(value, (master) => onChange({ ...bus, master }))}
+          data-testid="line-master"
+        />
+      </Tooltip>
+    </>
+  );
+}
+
+/** 45.45 and 93.75 kbit/s are no whole numbers. */
+const rateLabel = (rate: number, t: Translate): string =>
+  `${figure(rate / 1000, rate % 1000 === 0 ? 0 : 2, t.language)} kbit/s`;
 
 const ratesWith = (rate: number): number[] =>
   RATES.includes(rate) ? RATES : [...RATES, rate].sort((a, b) => a - b);

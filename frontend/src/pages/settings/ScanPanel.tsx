@@ -5,6 +5,7 @@ import { type FoundDevice, settings, type Site, type SiteBus, type SiteTurbine }
 import { NeedsRole } from "../../frame/NeedsRole";
 import { useTexts } from "../../texts/texts";
 import { JobProblem } from "./JobProblem";
+import { isProfibus } from "./profibusDraft";
 import classes from "./Settings.module.css";
 import { isKnown, takeOver, type TakenOver } from "./siteDraft";
 import { type StartedJob, useSettingsJob } from "./useSettingsJob";
@@ -25,14 +26,16 @@ export function ScanPanel({ bus, draft, descriptions, onTaken }: Props) {
   const needsConsent = job?.error?.code === "consent";
   return (
     <div className={classes.turbine} style={{ padding: "12px 0 4px" }} data-testid="scan-panel">
-      <p className={classes.places}>{t("page.settings.scan.explain")}</p>
+      <p className={classes.places}>
+        {t(isProfibus(bus) ? "lines.site.scan_explain" : "page.settings.scan.explain")}
+      </p>
       <div className={classes.row}>
         <NeedsRole role="technician" device>
           {(locked) => (
             <Button
               leftSection={<IconRadar2 size={18} aria-hidden />}
               disabled={locked || running || (needsConsent && !consent)}
-              onClick={() => work.start(() => settings.scan(bus.connection, bus.bitrate, consent))}
+              onClick={() => work.start(() => settings.scan(bus, consent))}
               data-testid="start-scan"
             >
               {t("page.settings.scan.start")}

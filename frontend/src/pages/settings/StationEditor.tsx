@@ -5,8 +5,10 @@ import { useTexts } from "../../texts/texts";
 import { AddressRow } from "./AddressRow";
 import { useFlaw } from "./flaws";
 import { freeNode, freeSlug, isModbus } from "./modbusDraft";
+import { isProfibus, kindOf, NO_SLAVE } from "./profibusDraft";
 import classes from "./Settings.module.css";
 import { deviceAt, stationAt } from "./siteDraft";
+import { SlaveRow } from "./SlaveRow";
 
 interface Props {
   station: SiteStation;
@@ -94,9 +96,9 @@ export function StationEditor({ station, draft, descriptions, known, onChange, o
 
 function newDevice(station: SiteStation, draft: SiteTurbine, descriptions: Site["descriptions"]): SiteDevice {
   const bus = draft.buses[0];
-  if (isModbus(bus)) {
+  if (isModbus(bus) || isProfibus(bus)) {
     const slug = freeSlug(station);
-    const kinds = descriptions.filter((one) => one.bus === "modbus-tcp");
+    const kinds = descriptions.filter((one) => one.bus === kindOf(bus));
     return {
       slug,
       name: slug.toUpperCase(),
@@ -105,6 +107,7 @@ function newDevice(station: SiteStation, draft: SiteTurbine, descriptions: Site[
       node: freeNode(draft, bus?.name ?? ""),
       address: "",
       external_stop: "",
+      ...NO_SLAVE,
     };
   }
   const taken = station.devices.map((one) => one.slug);
@@ -118,6 +121,7 @@ function newDevice(station: SiteStation, draft: SiteTurbine, descriptions: Site[
     node: station.blade === null ? base + 1 : base + station.blade,
     address: "",
     external_stop: "",
+    ...NO_SLAVE,
   };
 }
 
@@ -136,7 +140,7 @@ function DeviceRow({ at, device, buses, descriptions, fixed, onChange, onRemove 
   const cell = { paddingLeft: 0, verticalAlign: "top" } as const;
   const bus = buses.find((one) => one.name === device.bus);
   const tcp = isModbus(bus);
-  const fitting = descriptions.filter((one) => one.bus === (tcp ? "modbus-tcp" : "canopen"));
+  const fitting = descriptions.filter((one) => one.bus === kindOf(bus));
   const known = fitting.map((one) => ({ value: one.id, label: one.name }));
   const own = known.some((one) => one.value === device.description_id) || device.description_id === "";
   const slugFlaw = useFlaw(`${at}.slug`);
@@ -146,8 +150,8 @@ function DeviceRow({ at, device, buses, descriptions, fixed, onChange, onRemove 
   const nodeFlaw = useFlaw(`${at}.node`);
   const moveTo = (name: string | null) => {
     const to = buses.find((one) => one.name === name);
-    const stays = isModbus(to) === tcp;
-    const kind = stays ? {} : { description_id: "", address: "" };
+    const stays = kindOf(to) === kindOf(bus);
+    const kind = stays ? {} : { description_id: "", address: "", ...NO_SLAVE };
     onChange({ ...device, ...kind, bus: name ?? "" });
   };
   return (
@@ -221,6 +225,7 @@ function DeviceRow({ at, device, buses, descriptions, fixed, onChange, onRemove 
         </td>
       </tr>
       {tcp && <AddressRow at={at} device={device} onChange={onChange} />}
+      {isProfibus(bus) && <SlaveRow at={at} device={device} onChange={onChange} />}
     </>
   );
 }

@@ -12,6 +12,7 @@ import {
   serverText,
 } from "./modbusDraft";
 import { flawsOf, NEW_BUS } from "./siteDraft";
+import { NO_SLAVE } from "./profibusDraft";
 
 const bench = (): SiteTurbine => ({
   slug: "bench",
@@ -33,6 +34,7 @@ const bench = (): SiteTurbine => ({
           node: 1,
           address: "192.168.2.1",
           external_stop: "",
+          ...NO_SLAVE,
         },
       ],
     },

@@ -1,5 +1,6 @@
 /** Buses of Modbus TCP in a turbine that is edited: which addresses they allow, and which device stands where. Pure. */
 import type { SiteBus, SiteStation, SiteTurbine } from "../../api/settings";
+import { isProfibus, LAST_SLAVE, MASTER } from "./profibusDraft";
 
 /** The connection of a bus whose devices have an address each. */
 export const MODBUS = "modbus-tcp";
@@ -22,12 +23,15 @@ export const busOf = (turbine: SiteTurbine, name: string): SiteBus | undefined =
   turbine.buses.find((bus) => bus.name === name);
 
 /** The highest number that a device of the bus may have. */
-export const mostNodes = (bus: SiteBus | undefined): number => (isModbus(bus) ? MOST.modbus : MOST.can);
+export function mostNodes(bus: SiteBus | undefined): number {
+  if (isProfibus(bus)) return LAST_SLAVE;
+  return isModbus(bus) ? MOST.modbus : MOST.can;
+}
 
 /** The bus as one of Modbus TCP: it has ranges instead of an adapter, a bit rate and a node of ours. */
 export function asModbus(bus: SiteBus): SiteBus {
   const name = /^can\d$/.test(bus.name) ? "lan" : bus.name;
-  return { name, connection: MODBUS, bitrate: 0, heartbeat_node: OWN_NODE, ranges: [] };
+  return { name, connection: MODBUS, bitrate: 0, heartbeat_node: OWN_NODE, ranges: [], master: MASTER };
 }
 
 /** `HOST[:PORT][/UNIT]`, or null where it is none. */

@@ -1,11 +1,21 @@
 import { describe, expect, it } from "vitest";
 import type { FoundDevice, SiteTurbine } from "../../api/settings";
 import { emptyTurbine, fieldOf, flawsOf, isKnown, takeOver } from "./siteDraft";
+import { NO_SLAVE } from "./profibusDraft";
 
 const turbine = (): SiteTurbine => ({
   slug: "wtg-08",
   name: "WTG-08",
-  buses: [{ name: "can0", connection: "socketcan:can0", bitrate: 500_000, heartbeat_node: 126, ranges: [] }],
+  buses: [
+    {
+      name: "can0",
+      connection: "socketcan:can0",
+      bitrate: 500_000,
+      heartbeat_node: 126,
+      ranges: [],
+      master: 2,
+    },
+  ],
   stations: [
     {
       slug: "blade-1",
@@ -20,6 +30,7 @@ const turbine = (): SiteTurbine => ({
           node: 1,
           address: "",
           external_stop: "",
+          ...NO_SLAVE,
         },
       ],
     },
@@ -65,6 +76,7 @@ describe("a turbine that is edited", () => {
       node: 1,
       address: "",
       external_stop: "",
+      ...NO_SLAVE,
     });
     expect(kinds(one, ["wtg-08"])).toEqual([
       "slug taken",
@@ -80,6 +92,7 @@ describe("a turbine that is edited", () => {
       node: 1,
       address: "",
       external_stop: "",
+      ...NO_SLAVE,
     });
     expect(kinds(one)).toContain("station.blade-1.device.pmc.node node_taken");
   });

@@ -1,6 +1,7 @@
 /** A turbine that is being edited: what is wrong with it, and how found devices are taken over. Pure. */
 import type { FoundDevice, SiteDevice, SiteStation, SiteTurbine } from "../../api/settings";
 import { allows, busOf, isModbus, mostNodes, rangeOf, serverOf } from "./modbusDraft";
+import { isAddress, isProfibus, LAST_SLAVE, MASTER, missingOfGsd, NO_SLAVE, portOf } from "./profibusDraft";
 
 /** What is wrong at one field. `at` names the field as in the site file, below the turbine. */
 export interface Flaw {
@@ -11,7 +12,13 @@ export interface Flaw {
 
 const SLUG = /^[a-z0-9]+(-[a-z0-9]+)*$/;
 export const DEFAULT_BITRATE = 500_000;
-export const NEW_BUS = { connection: "", bitrate: DEFAULT_BITRATE, heartbeat_node: 126, ranges: [] };
+export const NEW_BUS = {
+  connection: "",
+  bitrate: DEFAULT_BITRATE,
+  heartbeat_node: 126,
+  ranges: [],
+  master: MASTER,
+};
 
 export const stationAt = (station: SiteStation) => `station.${station.slug}`;
 export const deviceAt = (station: SiteStation, device: SiteDevice) =>
@@ -59,7 +66,31 @@ function busFlaws(turbine: SiteTurbine, bus: SiteTurbine["buses"][number]): Flaw
   return [
     ...slugFlaws(`${at}.name`, bus.name),
     ...(same > 1 ? [flaw(`${at}.name`, "taken", { slug: bus.name })] : []),
-    ...(isModbus(bus) ? rangeFlaws(at, bus.ranges) : adapterFlaws(at, bus)),
+    ...wayFlaws(at, bus),
+  ];
+}
+
+/** What is wrong with how the bus is reached. */
+function wayFlaws(at: string, bus: SiteTurbine["buses"][number]): Flaw[] {
+  if (isModbus(bus)) return rangeFlaws(at, bus.ranges);
+  return isProfibus(bus) ? portFlaws(at, bus) : adapterFlaws(at, bus);
+}
+
+function portFlaws(at: string, bus: SiteTurbine["buses"][number]): Flaw[] {
+  return [
+    ...(/^[^@,\s]+$/.test(portOf(bus)) ? [] : [flaw(`${at}.connection`, "port")]),
+    ...(isAddress(bus.master) ? [] : [flaw(`${at}.master`, "node", { first: 1, last: LAST_SLAVE })]),
+  ];
+}
+
+/** A slave stands at another address than ours, and its GSD file comes with the names of its modules. */
+function slaveFlaws(turbine: SiteTurbine, at: string, device: SiteDevice): Flaw[] {
+  const bus = busOf(turbine, device.bus);
+  if (bus === undefined || !isProfibus(bus)) return [];
+  const missing = missingOfGsd(device);
+  return [
+    ...(device.node === bus.master ? [flaw(`${at}.node`, "master_taken")] : []),
+    ...(missing === null ? [] : [flaw(`${at}.${missing}`, "gsd")]),
   ];
 }
 
@@ -93,6 +124,7 @@ function stationFlaws(turbine: SiteTurbine, station: SiteStation): Flaw[] {
       ...nameFlaws(`${deviceAt(station, device)}.name`, device.name),
       ...(device.description_id === "" ? [flaw(`${deviceAt(station, device)}.description`, "empty")] : []),
       ...(buses.includes(device.bus) ? [] : [flaw(`${deviceAt(station, device)}.bus`, "bus")]),
+      ...slaveFlaws(turbine, deviceAt(station, device), device),
     ]),
   ];
 }
@@ -167,6 +199,7 @@ export function takeOver(turbine: SiteTurbine, bus: string, taken: readonly Take
       node: one.found.node,
       address: "",
       external_stop: "",
+      ...NO_SLAVE,
     };
     stations = withDevice({ ...turbine, stations }, one.station, device).stations;
   }
