@@ -70,7 +70,7 @@ function Meaning({ line, query, t }: { line: TraceLine; query: string; t: Transl
   const Sign = line.tone === "error" ? IconAlertOctagon : line.tone === "warning" ? IconAlertTriangle : null;
   // Of a telegram the remark says what it is about: behind all its objects there is no room for it.
   const notes = noteTexts(line, t).map((note) => (
-    <em key={note}>
+    <em key={note} data-first={line.fdl !== null}>
       <Marked text={note} query={query} />
     </em>
   ));
