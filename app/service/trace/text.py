@@ -17,7 +17,7 @@ from app.wire.frame import Adu, Can, Fdl, Frame
 from app.wire.modbus.functions import exception_text_key
 from app.wire.modbus.transactions import ARROW
 from app.wire.profibus.pkw import error_text_key
-from app.wire.profibus.telegrams import Signal
+from app.wire.profibus.telegrams import DIGITAL_INPUTS, Signal
 from app.wire.records import (
     BootUpSeen,
     EmcySeen,
@@ -246,7 +246,8 @@ def _signal(bus: str, node: int, signal: Signal, value: int, namer: Namer) -> Tr
     if entry is not None and entry.type.size is not None:
         data = value.to_bytes(entry.type.size, "little", signed=signal.signed)
         return namer.item(bus, node, entry.address, data)
-    return TraceItem(f"PZD {signal.number}", signal.name, None, str(value), "", None, ())
+    text = f"{value:04X}h" if signal is DIGITAL_INPUTS else str(value)
+    return TraceItem(f"PZD {signal.number}", signal.name, None, text, "", None, ())
 
 
 def notes_of(row: TraceRow, namer: Namer) -> Iterable[TraceNote]:

@@ -68,10 +68,17 @@ const isCarrying = (line: TraceLine): boolean => line.service === "modbus-respon
 
 function Meaning({ line, query, t }: { line: TraceLine; query: string; t: Translate }) {
   const Sign = line.tone === "error" ? IconAlertOctagon : line.tone === "warning" ? IconAlertTriangle : null;
+  // Of a telegram the remark says what it is about: behind all its objects there is no room for it.
+  const notes = noteTexts(line, t).map((note) => (
+    <em key={note} data-first={line.fdl !== null}>
+      <Marked text={note} query={query} />
+    </em>
+  ));
   return (
     <>
       {Sign && <Sign size={13} aria-hidden />}
       {line.step !== null && <i>{t(`trace.step.${line.step}`)}</i>}
+      {line.fdl !== null && notes}
       {line.items.slice(0, SHOWN_ITEMS).map((item, at) => (
         <Item
           key={`${item.address}-${String(at)}`}
@@ -84,11 +91,7 @@ function Meaning({ line, query, t }: { line: TraceLine; query: string; t: Transl
       {line.items.length > SHOWN_ITEMS && (
         <em>{t("trace.page.more_objects", { count: line.items.length - SHOWN_ITEMS })}</em>
       )}
-      {noteTexts(line, t).map((note) => (
-        <em key={note}>
-          <Marked text={note} query={query} />
-        </em>
-      ))}
+      {line.fdl === null && notes}
     </>
   );
 }

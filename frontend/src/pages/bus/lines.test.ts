@@ -70,6 +70,8 @@ describe("a row of PROFIBUS", () => {
     expect(serviceText(telegram, en)).toBe("DP unchanged");
     expect(serviceText(telegram, de)).toBe("DP unverändert");
     expect(shownBytes(telegram)).toEqual(["E5"]);
+    expect(shownBytes({ ...telegram, data: "680404680602 5d aa 0016".replaceAll(" ", "") })).toEqual(["AA"]);
+    expect(shownBytes({ ...telegram, fdl: { ...fdl, sound: false }, data: "6804" })).toEqual(["68", "04"]);
     expect([isCan(telegram), isCan(line({}))]).toEqual([false, true]);
   });
 

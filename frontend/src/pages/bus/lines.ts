@@ -29,9 +29,17 @@ export const bytesOf = (hex: string): string[] => hex.toUpperCase().match(/../g)
 /** Bytes of the MBAP header, which transaction, unit and length of the row tell as well. */
 export const HEADER_BYTES = 7;
 
-/** What a row shows of the bytes: of an ADU those behind its header. */
-export const shownBytes = (line: Pick<TraceLine, "data" | "transaction">): string[] =>
-  bytesOf(line.data).slice(line.transaction === null ? 0 : HEADER_BYTES);
+/** Bytes before the data of a telegram of PROFIBUS, by its start delimiter: up to the function code. */
+const FDL_HEADS: Readonly<Record<string, number>> = { "68": 7, A2: 4 };
+const FDL_TAIL = 2;
+
+/** What a row shows of the bytes: of an ADU those behind its header, of a telegram its data where it has some. */
+export function shownBytes(line: Pick<TraceLine, "data" | "transaction" | "fdl">): string[] {
+  const bytes = bytesOf(line.data);
+  if (line.transaction !== null) return bytes.slice(HEADER_BYTES);
+  const head = line.fdl?.sound ? FDL_HEADS[bytes[0] ?? ""] : undefined;
+  return head === undefined ? bytes : bytes.slice(head, -FDL_TAIL);
+}
 
 /** `TPDO2`, `SDO req`, `Heartbeat`, `FC 43 req`. */
 export function serviceText(line: Pick<TraceLine, "service" | "number">, t: Translate): string {
