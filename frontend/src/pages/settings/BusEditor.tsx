@@ -117,7 +117,7 @@ function BusRow({ bus, fixed, onChange, onRemove, scanning, onScan }: RowProps) 
         onChange={(event) => onChange({ ...bus, name: event.currentTarget.value })}
       />
       <Select
-        w={136}
+        w={158}
         label={t("page.settings.modbus.kind")}
         data={[
           { value: "canopen", label: t("page.settings.modbus.can") },
