@@ -25,6 +25,7 @@ from app.model.description import (
     Bus,
     Condition,
     Description,
+    Effect,
     Entry,
     Enumeration,
     EnumValue,
@@ -42,6 +43,7 @@ from app.model.description import (
     RestoreClass,
     SaveCommand,
     Source,
+    Standstill,
     TableRule,
     Variant,
     VariantValues,
@@ -59,14 +61,14 @@ BUILTIN: Final = {
 
 _TOP_KEYS: Final = frozenset(
     "schema id version name vendor bus addressing manual match save load variant source unit_rule group bit_table "
-    "enumeration error object".split()
+    "enumeration error object standstill".split()
 )
 _ERROR_KEYS: Final = frozenset(("code", "name", "reaction", "aid", "number", "origin"))
 _OWN_KEYS: Final = frozenset(("index", "ind", "pnu", "kind", "subs", "elements"))
 _ROW_KEYS: Final = frozenset(
     "name section group type access pdo default saved save_category unit scale hex unit_from min max enumeration bits "
     "restore verify requires mirror by_variant note inferred origin timeout_s node_id motion also counts ipv4 "
-    "overwritten_by enumeration_from bits_from limits_from step only signals tool_name".split()
+    "overwritten_by enumeration_from bits_from limits_from step only signals tool_name effects".split()
 )
 _NOT_INHERITED_BY_SUB0: Final = _ROW_KEYS - {"section", "group", "saved", "save_category", "inferred", "origin"}
 _PDO_SIDES: Final = frozenset(side.value for side in PdoSide)
@@ -175,9 +177,20 @@ class _Reader:
             variants=tuple(str(variant.get("id")) for variant in data.get("variant", ())),
             variant_details={one.id: one for one in self._tables("variant", _variant_detail)},
             sources={one.id: one for one in self._tables("source", _source)},
+            standstill=self._standstill(),
         )
         self._cross_check(description)
         return description
+
+    def _standstill(self) -> Standstill | None:
+        table = self._data.get("standstill")
+        if table is None:
+            return None
+        try:
+            return Standstill(parse_address(_text(table, "address")), _int(table, "driven"))
+        except (_WrongError, UsageError) as error:
+            self._say(self._lines.key("standstill"), f"[standstill]: {_reason(error)}")
+            return None
 
     def _tables(self, key: str, read: Any) -> Iterator[Any]:
         for number, table in enumerate(self._data.get(key, ())):
@@ -288,6 +301,10 @@ class _Reader:
             only=tuple(row.get("only", ())),
             signals=tuple(row.get("signals", ())),
             tool_name=_text(row, "tool_name") if "tool_name" in row else None,
+            effects=tuple(
+                Effect(parse_address(one["address"]), _int(one, "value"), tuple(one["writing"]))
+                for one in row.get("effects", ())
+            ),
             line=line,
         )
 
@@ -303,6 +320,8 @@ class _Reader:
         for entry in description:
             for reason in _contradictions(description, entry):
                 self._say(entry.line, f"{entry.address.short}: {reason}")
+        if description.standstill is not None and description.standstill.address not in description.entries:
+            self._say(self._lines.key("standstill"), f"standstill {description.standstill.address} is no object")
         for key, commands in (("save", description.save), ("load", description.load)):
             for number, command in enumerate(commands):
                 if command.address not in description.entries:
@@ -370,6 +389,8 @@ def _references(entry: Entry) -> Iterator[tuple[str, Address]]:
         yield "unit_from", entry.quantity_rule.address
         if entry.quantity_rule.shaft is not None:
             yield "unit_from shaft", entry.quantity_rule.shaft
+        for address in entry.quantity_rule.after:
+            yield "unit_from after", address
     for what, limit in (("min", entry.minimum), ("max", entry.maximum)):
         if isinstance(limit, LimitRef):
             yield what, limit.address
@@ -382,6 +403,8 @@ def _references(entry: Entry) -> Iterator[tuple[str, Address]]:
             yield key, rule.address
     for condition in entry.requires:
         yield "requires", condition.address
+    for effect in entry.effects:
+        yield "effects", effect.address
     if entry.mirror is not None:
         yield "mirror", entry.mirror.of
 
@@ -480,7 +503,12 @@ def _quantity_rule(row: Mapping[str, Any] | None) -> QuantityRule | None:
         return None
     choices = {int(value, 0): _quantity(choice) for value, choice in row.get("choices", {}).items()}
     shaft = row.get("shaft")
-    return QuantityRule(parse_address(row["address"]), choices, None if shaft is None else parse_address(shaft))
+    return QuantityRule(
+        parse_address(row["address"]),
+        choices,
+        None if shaft is None else parse_address(shaft),
+        tuple(map(parse_address, row.get("after", ()))),
+    )
 
 
 def _table_rule(row: Mapping[str, Any] | None) -> TableRule | None:

@@ -35,6 +35,8 @@ class Why(Enum):
     NETWORK = "network"
     """Decides at which address the device is found: it goes along only where a person chose that."""
     NEEDS_EXPERT = "needs-expert"
+    CONDITION = "condition"
+    """The device takes it only while an object that nobody can write holds another value; ``details`` say which."""
     READ_ONLY = "read-only"
     UNREADABLE = "unreadable"
     """The device did not tell its present value, so that nothing could be undone."""
