@@ -105,6 +105,13 @@ class FoundNode:
         return self.device_name is not None and self.device_name.startswith(TWIN_NAME)
 
 
+class OrderStanding(NamedTuple):
+    """Whether it is proven in which order the bytes of process data come, and the text key of why not."""
+
+    proven: bool
+    reason_key: str
+
+
 class Driver(Protocol):
     """How devices of one bus are asked. All waits end: by ``timeout_s``, or by the object's own time-out where None.
 

@@ -17,6 +17,7 @@ from app.drivers.contract import (
     FoundNode,
     FramesCallback,
     LinkState,
+    OrderStanding,
     ProgressCallback,
     Written,
 )
@@ -27,7 +28,7 @@ from app.drivers.profibus_line import Line, SerialLine
 from app.drivers.profibus_order import OrderCheck
 from app.drivers.profibus_probe import Probed
 from app.drivers.profibus_save import save
-from app.drivers.profibus_scan import found_node, is_twin, look
+from app.drivers.profibus_scan import TWIN_IDENT, found_node, is_twin, look
 from app.drivers.profibus_startup import STATUSWORD
 from app.drivers.profibus_station import StationState
 from app.drivers.profibus_taps import Taps
@@ -227,6 +228,18 @@ class ProfibusDriver:
     async def check_order(self, node: int) -> OrderCheck:
         """The guided check of the order of process data: what PKW reads, compared with them."""
         return await self._opened(node).startup.check_order()
+
+    async def order_standing(self, node: int) -> OrderStanding:
+        """Whether a bit of the controlword may be sent; what is not proven yet is compared now, by reading alone."""
+        if (await self.view(node)).order is not None:
+            return OrderStanding(True, "profibus.order.proven")
+        check = await self.check_order(node)
+        return OrderStanding(check.proven is not None, check.reason_key)
+
+    async def is_twin(self, node: int) -> bool:
+        """The station says by its ident number that it is simulated. Raises BusLostError."""
+        diagnosis = (await self.view(node)).diagnosis
+        return diagnosis is not None and diagnosis.ident == TWIN_IDENT
 
     async def view(self, node: int) -> StationView:
         """Where the station at ``node`` is, and its process data. Raises BusLostError."""

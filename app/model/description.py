@@ -14,6 +14,7 @@ from typing import Final
 
 from app.errors import UnknownObjectError
 from app.model.address import Address, Addressing
+from app.model.axis_machine import StateMachine, machine_of
 from app.model.datatypes import DataType, Raw
 
 Lookup = Callable[[Address], Raw | None]
@@ -393,17 +394,6 @@ class SaveCommand:
 
 
 @dataclass(frozen=True, slots=True)
-class Standstill:
-    """How a device without a statusword of CiA 402 tells that its axis is not driven.
-
-    It is driven while the object at ``address`` has any bit of ``driven`` set.
-    """
-
-    address: Address
-    driven: int
-
-
-@dataclass(frozen=True, slots=True)
 class Match:
     """How a device on the bus is recognised: 1000h and a piece of 1008h; None matches anything."""
 
@@ -452,10 +442,16 @@ class Description:
     variants: tuple[str, ...] = ()
     variant_details: Mapping[str, Variant] = field(default_factory=dict)
     sources: Mapping[str, Source] = field(default_factory=dict)
-    standstill: Standstill | None = None
+    state_machine: StateMachine | None = None
+    """Of an axis that has another one than CiA 402: see ``machine``."""
 
     def __iter__(self) -> Iterator[Entry]:
         return iter(self.entries.values())
+
+    @property
+    def machine(self) -> StateMachine | None:
+        """The state machine by which it is commanded; None where it is no axis."""
+        return machine_of(self.entries, self.state_machine)
 
     def entry(self, address: Address) -> Entry:
         """The entry at ``address``. Raises UnknownObjectError."""

@@ -16,6 +16,7 @@ from typing import Any, Final, TypeVar
 
 from app.errors import DescriptionError, UsageError
 from app.model.address import Address, Addressing, parse_address
+from app.model.axis_machine import StateMachine
 from app.model.bundled import bundled_folder
 from app.model.datatypes import DataType, Raw, encode_raw
 from app.model.description import (
@@ -43,12 +44,12 @@ from app.model.description import (
     RestoreClass,
     SaveCommand,
     Source,
-    Standstill,
     TableRule,
     Variant,
     VariantValues,
     Verify,
 )
+from app.model.description_machine import machine_state, machine_transition, state_machine
 from app.model.toml_lines import TomlLines
 
 SCHEMA: Final = 1
@@ -61,7 +62,7 @@ BUILTIN: Final = {
 
 _TOP_KEYS: Final = frozenset(
     "schema id version name vendor bus addressing manual match save load variant source unit_rule group bit_table "
-    "enumeration error object standstill".split()
+    "enumeration error object state_machine state transition".split()
 )
 _ERROR_KEYS: Final = frozenset(("code", "name", "reaction", "aid", "number", "origin"))
 _OWN_KEYS: Final = frozenset(("index", "ind", "pnu", "kind", "subs", "elements"))
@@ -177,20 +178,10 @@ class _Reader:
             variants=tuple(str(variant.get("id")) for variant in data.get("variant", ())),
             variant_details={one.id: one for one in self._tables("variant", _variant_detail)},
             sources={one.id: one for one in self._tables("source", _source)},
-            standstill=self._standstill(),
+            state_machine=self._state_machine(),
         )
         self._cross_check(description)
         return description
-
-    def _standstill(self) -> Standstill | None:
-        table = self._data.get("standstill")
-        if table is None:
-            return None
-        try:
-            return Standstill(parse_address(_text(table, "address")), _int(table, "driven"))
-        except (_WrongError, UsageError) as error:
-            self._say(self._lines.key("standstill"), f"[standstill]: {_reason(error)}")
-            return None
 
     def _tables(self, key: str, read: Any) -> Iterator[Any]:
         for number, table in enumerate(self._data.get(key, ())):
@@ -198,6 +189,19 @@ class _Reader:
                 yield read(table)
             except (_WrongError, UsageError, KeyError, TypeError, ValueError) as error:
                 self._say(self._lines.table(key, number), f"[[{key}]]: {_reason(error)}")
+
+    def _state_machine(self) -> StateMachine | None:
+        head = self._data.get("state_machine")
+        if head is None:
+            return None
+        profile = str(head.get("profile"))
+        states = tuple(self._tables("state", lambda table: machine_state(table, profile)))
+        transitions = tuple(self._tables("transition", lambda table: machine_transition(table, profile, states)))
+        try:
+            return state_machine(head, profile, states, transitions)
+        except (UsageError, KeyError, TypeError, ValueError) as error:
+            self._say(self._lines.key("state_machine"), f"[state_machine]: {_reason(error)}")
+            return None
 
     def _entries(self) -> dict[Address, Entry]:
         found: dict[Address, Entry] = {}
@@ -317,11 +321,13 @@ class _Reader:
         return self._unit_rules[value]
 
     def _cross_check(self, description: Description) -> None:
+        machine = description.state_machine
+        for address in () if machine is None else (machine.controlword, machine.statusword):
+            if address not in description.entries:
+                self._say(self._lines.key("state_machine"), f"{address.short} of the state machine is no object")
         for entry in description:
             for reason in _contradictions(description, entry):
                 self._say(entry.line, f"{entry.address.short}: {reason}")
-        if description.standstill is not None and description.standstill.address not in description.entries:
-            self._say(self._lines.key("standstill"), f"standstill {description.standstill.address} is no object")
         for key, commands in (("save", description.save), ("load", description.load)):
             for number, command in enumerate(commands):
                 if command.address not in description.entries:

@@ -6,10 +6,12 @@ import csv
 import io
 import json
 from collections.abc import Iterable, Mapping
+from dataclasses import asdict
 from decimal import Decimal
 from typing import Any, Final
 
 from app.model.address import Address, Addressing
+from app.model.axis_machine import StateMachine
 from app.model.datatypes import Raw
 from app.model.description import (
     Access,
@@ -132,7 +134,22 @@ def description_dict(description: Description) -> dict[str, Any]:
         "errors": [_error_code(error) for error in description.errors.values()],
         "save": _commands(description.save),
         "load": _commands(description.load),
+        "state_machine": _machine(description.state_machine),
         "entries": [entry_dict(entry) for entry in description],
+    }
+
+
+def _machine(machine: StateMachine | None) -> dict[str, Any] | None:
+    """Null for a device whose states are those of CiA 402, and for one that is no axis."""
+    if machine is None:
+        return None
+    return {
+        "profile": machine.profile,
+        "controlword": machine.controlword.short,
+        "statusword": machine.statusword.short,
+        "stop_word": machine.stop_word,
+        "states": [{**asdict(state), "place": list(state.place)} for state in machine.states],
+        "transitions": [asdict(transition) for transition in machine.transitions],
     }
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from threading import Lock
 from typing import Any, Protocol
 
-from app.drivers.contract import DriverStatus
+from app.drivers.contract import DriverStatus, OrderStanding
 from app.model.address import Address
 from app.model.description import Bus, Description
 from app.model.site import BusConfig, Turbine
@@ -113,6 +113,22 @@ class BusLink(BusFeed):
     def needs_consent(self) -> bool:
         """Another master is at work, and nobody has consented to active access yet."""
         return bool(getattr(self.driver, "needs_consent", False))  # where only one can be, there is no other master
+
+    async def order_check(self, node: int) -> OrderStanding | None:
+        """How the proof of the order of process data stands; None where there is nothing to be proven.
+
+        What is not proven yet is compared now, by reading alone. Raises BusLostError, NoAnswerError, DeviceError.
+        """
+        ask = getattr(self.driver, "order_standing", None)
+        if ask is None:
+            return None
+        standing: OrderStanding = await ask(node)
+        return standing
+
+    async def tells_twin(self, node: int) -> bool:
+        """A station without a name says by its ident number that it is simulated; False where none can."""
+        ask = getattr(self.driver, "is_twin", None)
+        return ask is not None and bool(await ask(node))
 
     @property
     def has_pdos(self) -> bool:

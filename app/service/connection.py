@@ -22,7 +22,7 @@ from app.service.journal import Journal, Kind
 from app.service.office.foreign_writes import ForeignWrites
 from app.service.options import Options
 from app.service.recording import Recording, Subject
-from app.service.stop import CONTROLWORD, Axis, is_axis
+from app.service.stop import Axis, is_axis, machine_of
 from app.wire.frame import Stamper
 from app.wire.live import LiveState
 
@@ -152,7 +152,8 @@ class Connection:
 
     def _axis(self, target: Target) -> Axis:
         link = self.buses[target.device.bus]
-        return Axis(link.driver, target, lambda data: link.send_pdo(target.node, CONTROLWORD, data))
+        controlword = machine_of(target).controlword
+        return Axis(link.driver, target, lambda data: link.send_pdo(target.node, controlword, data))
 
     def _target(self, device: Device, descriptions: Mapping[str, Description]) -> Target:
         description = descriptions.get(device.description_id)

@@ -1,5 +1,6 @@
 """STOP and FEATHER: to every axis of the live connection, on the shortest path there is.
 
+An axis is stopped by the word that its state machine names: quick stop of CiA 402, or one that takes the power away.
 Where the node is operational and an event-driven RPDO carries the controlword alone, one frame does it; an RPDO that
 waits for a SYNC or has an inhibit time is none for this, nor is one of which that is not known. Otherwise our running
 transfer to that node is aborted and 6040h is written by SDO, ahead of everything that waits. A write of 6040h that was
@@ -17,9 +18,9 @@ from enum import Enum
 from typing import Final
 
 from app.drivers.contract import Driver
-from app.errors import BusLostError, HubsideError, OvertakenError
+from app.errors import BusLostError, HubsideError, OvertakenError, UsageError
 from app.model.address import Address
-from app.model.axis_state import AxisState
+from app.model.axis_machine import CIA_402, StateMachine
 from app.model.description import Verify
 from app.service.devices import Target, decode
 from app.service.journal import Journal, Kind
@@ -31,7 +32,10 @@ _OBEY_S: Final = 0.03
 
 
 class Command(Enum):
-    """What is sent; the value is the controlword (CiA 402 quick stop; EFC is bit 11 of the maker)."""
+    """What is sent; the value is the controlword of CiA 402 (quick stop; EFC is bit 11 of the maker).
+
+    An axis with another state machine has a word of its own for STOP, and none for FEATHER: ``word_for``.
+    """
 
     STOP = 0x010B
     FEATHER = 0x080F
@@ -84,8 +88,27 @@ async def command_all(
 
 
 def is_axis(target: Target) -> bool:
-    """True for a device that has a controlword of CiA 402."""
-    return CONTROLWORD in target.description.entries and STATUSWORD in target.description.entries
+    """True for a device that is commanded by a controlword: its description tells its state machine."""
+    return target.description.machine is not None
+
+
+def machine_of(target: Target) -> StateMachine:
+    """The state machine of an axis. Raises UsageError."""
+    machine = target.description.machine
+    if machine is None:
+        raise UsageError(reason=f"{target.slug} is no axis")
+    return machine
+
+
+def is_cia402(target: Target) -> bool:
+    """True for an axis of the profile CiA 402."""
+    return target.description.machine is CIA_402
+
+
+def word_for(target: Target, command: Command) -> bytes:
+    """The controlword by which an axis obeys ``command``."""
+    word = machine_of(target).stop_word if command is Command.STOP else command.value
+    return word.to_bytes(2, "little")
 
 
 def has_feather(target: Target) -> bool:
@@ -95,14 +118,14 @@ def has_feather(target: Target) -> bool:
 
 async def _command(axis: Axis, command: Command, now_ns: Callable[[], int]) -> AxisOutcome:
     driver, target = axis.driver, axis.target
-    data = command.value.to_bytes(2, "little")
+    data, controlword = word_for(target, command), machine_of(target).controlword
     sent_t_ns = now_ns()
     try:
         if _by_rpdo(axis, data):
             how = Path.RPDO
-            mark = driver.commanded(target.node, CONTROLWORD)
+            mark = driver.commanded(target.node, controlword)
         else:
-            await driver.write(target.node, CONTROLWORD, data, verify=Verify.ACK, urgent=True)
+            await driver.write(target.node, controlword, data, verify=Verify.ACK, urgent=True)
             how = Path.SDO
         confirmed = await _confirmed(driver, target, command)
         if how is Path.RPDO and not confirmed:
@@ -138,9 +161,11 @@ def _by_rpdo(axis: Axis, data: bytes) -> bool:
 
 
 async def _confirmed(driver: Driver, target: Target, command: Command) -> bool:
-    """The statusword says that the axis obeys: it has left operation enabled (STOP), or drives there (FEATHER)."""
-    raw = decode(target.entry(STATUSWORD), await driver.read(target.node, STATUSWORD, urgent=True))
+    """The statusword says that the axis obeys: it follows nothing any more (STOP), or drives there (FEATHER)."""
+    machine = machine_of(target)
+    raw = decode(target.entry(machine.statusword), await driver.read(target.node, machine.statusword, urgent=True))
     if not isinstance(raw, int):
         return False
-    enabled = AxisState.of(raw) is AxisState.OPERATION_ENABLED
-    return enabled if command is Command.FEATHER else not enabled
+    if command is Command.FEATHER:
+        return machine.runs(raw)
+    return not machine.runs(raw) if machine is CIA_402 else machine.rests(raw)

@@ -16,11 +16,12 @@ from app.model.address import Address
 from app.model.axis_state import ENERGISED, AxisState
 from app.service.journal import Journal
 from app.service.motion.bounds import HIGHEST, LOWEST, TARGET_VELOCITY
-from app.service.motion.control import AxisMode, Control, Word
+from app.service.motion.control import AxisMode, Control, Word, cia402
 from app.service.motion.desk import MotionDesk
 from app.service.motion.interlocks import POSITION
-from app.service.motion.moves import come_to_rest, raw_of, set_object, wait
+from app.service.motion.moves import come_to_rest
 from app.service.motion.running import Doing, Ended, Running
+from app.service.motion.steps import raw_of, set_object, wait
 
 OUTPUTS: Final = Address(0x60FE, 3)
 BRAKE: Final = 1 << 0
@@ -67,7 +68,7 @@ async def try_brake(desk: MotionDesk, slug: str, fence: int, journal: Journal) -
     found = [BrakeTest()]
 
     async def work(running: Running) -> None:
-        control = running.control
+        control = cia402(running.control)
         await control.set_mode(AxisMode.PROFILE_VELOCITY)
         speed = await raw_of(control, TARGET_VELOCITY, await _away_from_limits(control))
         await set_object(control, TARGET_VELOCITY, speed, journal)
@@ -92,7 +93,7 @@ async def _away_from_limits(control: Control) -> float:
 
 async def _turn(running: Running) -> BrakeTest:
     """Enable the axis, wait for the contact, turn the blade by half a degree and halt it."""
-    control, loop = running.control, asyncio.get_running_loop()
+    control, loop = cia402(running.control), asyncio.get_running_loop()
     began_s = loop.time()
     await control.enable()
     running.turning = True
@@ -123,7 +124,7 @@ async def _held_fast(control: Control) -> bool:
 
 async def _rest(running: Running, so_far: BrakeTest) -> BrakeTest:
     """The axis has no power now: wait for the contact, then see whether the blade stays."""
-    control, loop = running.control, asyncio.get_running_loop()
+    control, loop = cia402(running.control), asyncio.get_running_loop()
     engaged_s = await _contact(running, False, loop.time())
     if engaged_s is None:
         verdict = so_far.verdict if running.over.is_set() else BrakeVerdict.NOT_ENGAGED

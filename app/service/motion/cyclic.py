@@ -28,11 +28,11 @@ from app.model.values import quantity_of
 from app.service.devices import Target, decode
 from app.service.journal import Journal
 from app.service.motion.borrowed import TARGET, Borrowed, PdoFound
-from app.service.motion.control import AxisMode, Control, Word
+from app.service.motion.control import AxisMode, Control, Word, cia402
 from app.service.motion.courses import CURRENT, FOLLOWING, POSITION, VELOCITY, Courses
 from app.service.motion.desk import MotionDesk
-from app.service.motion.moves import STOPPING, come_to_rest
-from app.service.motion.running import Doing, Ended, Running
+from app.service.motion.moves import come_to_rest
+from app.service.motion.running import STOPPING, Doing, Ended, Running
 from app.service.motion.signals import MOST_DPS, DriveLimits, Shape, Signal, check
 from app.service.stop import CONTROLWORD, STATUSWORD
 from app.service.write import know_what_it_rests_on, write_raw
@@ -176,11 +176,11 @@ class _Run:
     def __init__(self, desk: MotionDesk, running: Running, played: Played, journal: Journal) -> None:
         self._desk = desk
         self._running = running
-        self._control: Control = running.control
+        self._control: Control = cia402(running.control)
         self._target = running.control.target
         self._played = played
         self._journal = journal
-        self._borrowed = Borrowed(running.control, desk.left, journal)
+        self._borrowed = Borrowed(cia402(running.control), desk.left, journal)
         self._scale = degrees_per_unit(self._target)
         self._pdo: PdoFound | None = None
         self._beside: dict[Address, bytes] = {}

@@ -33,7 +33,8 @@ from app.service.connection import Connection
 from app.service.devices import Target
 from app.service.journal import Journal, Kind
 from app.service.motion import interlocks, preparation
-from app.service.motion.control import Control
+from app.service.motion.commanding import Commanding
+from app.service.motion.controls import control_class
 from app.service.motion.dead_man import SILENCE_S, DeadMan
 from app.service.motion.halting import Halting
 from app.service.motion.heartbeat import Heartbeat, NoHeartbeat
@@ -41,8 +42,8 @@ from app.service.motion.interlocks import Confirmed, Interlock, Standing
 from app.service.motion.lease import Holder, Lease
 from app.service.motion.left import Left
 from app.service.motion.preparation import Prepared
-from app.service.motion.running import Doing, Ended, Last, Running
-from app.service.stop import CONTROLWORD, is_axis
+from app.service.motion.running import STOPPING, Doing, Ended, Last, Running
+from app.service.stop import is_axis, machine_of
 from app.wire.sdo_follower import SAVE_INDEX
 
 UNKNOWN: Final = "–"
@@ -55,8 +56,6 @@ LOOK_AGAIN_S: Final = 0.5
 
 
 _UNHEARD: Final = (BusLostError, NoAnswerError)
-_STOPPED: Final = (Ended.SILENT, Ended.LEASE, Ended.LINK, Ended.INTERLOCK)
-"""A quick stop was sent already."""
 
 
 class MotionDesk:
@@ -337,7 +336,7 @@ class MotionDesk:
                 if heartbeat.watched:
                     await preparation.prove(axis, heartbeat, lambda: not running.over.is_set())
                     running.held = False  # the axis has no power of ours any more
-                    await preparation.after_proof(control)
+                    await preparation.after_proof(axis)
             except BaseException:
                 await asyncio.shield(self._put_back(axis, journal))
                 raise
@@ -444,7 +443,7 @@ class MotionDesk:
         await self._require_no_feather(control)
         await control.halt()
 
-    async def _require_no_feather(self, control: Control) -> None:
+    async def _require_no_feather(self, control: Commanding) -> None:
         """Raises InterlockError where an EFC is under way: whatever is commanded now would end it."""
         if await control.is_feathering():
             key = "interlock.reason.feathering"
@@ -480,7 +479,7 @@ class MotionDesk:
         slug: str,
         fence: int,
         doing: Doing,
-        control: Control,
+        control: Commanding,
         work: Callable[[Running], Awaitable[None]],
         held: bool,
     ) -> None:
@@ -513,7 +512,7 @@ class MotionDesk:
             running.end(Ended.DONE)
         except BaseException as failed:  # whatever it is: nobody looks after the axis any more
             error = failed if isinstance(failed, HubsideError) else None
-            if running.why not in _STOPPED:
+            if running.why not in STOPPING:
                 if isinstance(failed, _UNHEARD) and not self._heartbeats[control.target.device.bus].watched:
                     self._halting.lost(running)  # a connection whose end nobody tells looks like this
                 else:
@@ -558,12 +557,13 @@ class MotionDesk:
             raise UsageError(reason=f"{slug} is no axis")
         return target
 
-    def _control(self, target: Target) -> Control:
+    def _control(self, target: Target) -> Commanding:
         link = self.connection.buses[target.device.bus]
-        return Control(
+        machine = machine_of(target)
+        return control_class(machine)(
             link.driver,
             target.past_claims(),
-            (lambda data: link.send_pdo(target.node, CONTROLWORD, data)) if link.has_pdos else None,
+            (lambda data: link.send_pdo(target.node, machine.controlword, data)) if link.has_pdos else None,
             lambda mode: self.left.note_mode_set(target.slug, mode),
         )
 

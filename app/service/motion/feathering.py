@@ -12,11 +12,12 @@ from typing import Final
 
 from app.errors import AxisStateError
 from app.model.axis_state import ENERGISED, AxisState
-from app.service.motion.control import Word
+from app.service.motion.control import Word, cia402
 from app.service.motion.desk import MotionDesk
 from app.service.motion.interlocks import POSITION
-from app.service.motion.moves import come_to_rest, wait
+from app.service.motion.moves import come_to_rest
 from app.service.motion.running import Doing, Ended, Running
+from app.service.motion.steps import wait
 from app.service.stop import EFC_TARGET
 
 BEGIN_TIMEOUT_S: Final = 2.0
@@ -53,7 +54,7 @@ async def feather(desk: MotionDesk, slug: str, fence: int) -> Feathered:
 
 
 async def _drive(running: Running) -> Feathered:
-    control, loop = running.control, asyncio.get_running_loop()
+    control, loop = cia402(running.control), asyncio.get_running_loop()
     running.let_go = Word.QUICK_STOP
     target_deg, from_deg = await control.scaled(EFC_TARGET), await control.scaled(POSITION)
     began_s = loop.time()
@@ -76,7 +77,7 @@ async def _drive(running: Running) -> Feathered:
 
 async def _until_there(running: Running, target_deg: float) -> None:
     """Until the blade stands at its target, or the 90 degree switch has ended the drive (transition 5)."""
-    control = running.control
+    control = cia402(running.control)
     while not running.over.is_set():
         state = await control.state()
         if state in _FAILED:

@@ -13,11 +13,10 @@ from typing import Final
 
 from app.drivers.contract import LinkState
 from app.errors import BusLostError, HubsideError, NoAnswerError, OvertakenError
-from app.model.axis_state import AxisState
 from app.service.connection import Connection
 from app.service.journal import Journal, Kind
 from app.service.motion import preparation
-from app.service.motion.control import Control
+from app.service.motion.commanding import Commanding
 from app.service.motion.dead_man import DeadMan
 from app.service.motion.heartbeat import Heartbeat
 from app.service.motion.preparation import Prepared
@@ -65,7 +64,7 @@ class Halting:
             self._journal.note(Kind.MOTION_LOST, running.slug)
             self.chore(self._stop_once_back(running.control))
 
-    async def _stop_once_back(self, control: Control) -> None:
+    async def _stop_once_back(self, control: Commanding) -> None:
         """Quick stop as soon as the device can be reached again, unless somebody else has commanded it by then."""
         link = self._connection.buses[control.target.device.bus]
         end_s = monotonic() + BACK_S
@@ -86,7 +85,7 @@ class Halting:
             running.end(Ended.RELEASED)
             return
         try:
-            at_once = running.control.let_go(running.let_go)
+            at_once = running.control.let_go(running.let_go or running.control.halt_word)
             running.end(Ended.RELEASED)
             if not at_once:
                 self.chore(self._let_go_by_write(running))
@@ -98,7 +97,7 @@ class Halting:
 
     async def _let_go_by_write(self, running: Running) -> None:
         try:
-            await running.control.let_go_by_write(running.let_go)
+            await running.control.let_go_by_write(running.let_go or running.control.halt_word)
         except HubsideError as error:
             log.warning("%s: halt was not sent: %s", running.slug, error.code)
             self.stop(running, Ended.RELEASED)
@@ -118,13 +117,13 @@ class Halting:
         self.chore(self._see_off(running.control))
         self._journal.note(Kind.MOTION_STOPPED, running.slug, reason=why.value)
 
-    async def _see_off(self, control: Control) -> None:
+    async def _see_off(self, control: Commanding) -> None:
         """A quick stop that the axis does not obey is written, and our heartbeat ends until it has no power."""
         heartbeat = self._heartbeats[control.target.device.bus]
         slug = control.target.slug
         try:
             await asyncio.sleep(OBEY_S)
-            if control.overtaken or await control.state() is not AxisState.OPERATION_ENABLED:
+            if control.overtaken or not await control.is_enabled():
                 heartbeat.go_on(slug)
                 return
         except HubsideError as error:

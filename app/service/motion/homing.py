@@ -11,12 +11,13 @@ from app.errors import AxisStateError, UsageError
 from app.model.axis_state import AxisState
 from app.service.journal import Journal, Kind
 from app.service.motion.borrowed import Borrowed
-from app.service.motion.control import ACKNOWLEDGED, TARGET_REACHED, AxisMode, Word
+from app.service.motion.control import ACKNOWLEDGED, TARGET_REACHED, AxisMode, Word, cia402
 from app.service.motion.desk import MotionDesk
 from app.service.motion.home_methods import METHOD, methods_of, searches
 from app.service.motion.interlocks import POSITION
-from app.service.motion.moves import come_to_rest, wait
+from app.service.motion.moves import come_to_rest
 from app.service.motion.running import Doing, Ended, Running
+from app.service.motion.steps import wait
 
 ATTAINED: Final = ACKNOWLEDGED
 """Bit 12 in homing mode."""
@@ -36,7 +37,7 @@ async def search_home(desk: MotionDesk, slug: str, fence: int, method: int, jour
     found: list[float] = []
 
     async def work(running: Running) -> None:
-        borrowed = Borrowed(running.control, desk.left, journal)
+        borrowed = Borrowed(cia402(running.control), desk.left, journal)
         try:
             await _search(running, borrowed, method)
         finally:
@@ -50,7 +51,7 @@ async def search_home(desk: MotionDesk, slug: str, fence: int, method: int, jour
 
 
 async def _search(running: Running, borrowed: Borrowed, method: int) -> None:
-    control = running.control
+    control = cia402(running.control)
     await control.switch_off()
     await borrowed.number(METHOD, method)
     await control.set_mode(AxisMode.HOMING)
@@ -68,7 +69,7 @@ async def _search(running: Running, borrowed: Borrowed, method: int) -> None:
 
 
 async def _until_found(running: Running) -> None:
-    control = running.control
+    control = cia402(running.control)
     while not running.over.is_set():
         status = await control.status()
         if control.overtaken or AxisState.of(status) is not AxisState.OPERATION_ENABLED:

@@ -48,6 +48,8 @@ class Interlock(Enum):
     SELF_STOP = "self_stop"
     """Something stops it by itself when the connection is lost, or may it do without."""
     ZONE_CLEAR = "zone_clear"
+    ORDER = "pzd_order"
+    """It is proven in which order the bytes of its process data come, the controlword among them."""
     BATTERY_TEST = "battery_test"
     INPUT_TEST = "input_test"
 
@@ -112,8 +114,17 @@ async def look(
         Standing(Interlock.HEARTBEAT_NODE, heartbeat.seen, {"node": heartbeat.node})
         if heartbeat.watched
         else await _without_watch(connection, target, confirmed),
+        *(await _order(link, target)),
         *(_tested(tests, station_slug(target.slug) in tested_here) if blade else ()),
     ]
+
+
+async def _order(link: BusLink, target: Target) -> list[Standing]:
+    """Where the order of process data has to be proven before a bit of the controlword may be sent."""
+    check = await link.order_check(target.node)
+    if check is None:
+        return []
+    return [Standing(Interlock.ORDER, not check.proven, {"why_key": check.reason_key})]
 
 
 def turns_blade(connection: Connection, target: Target) -> bool:
@@ -157,7 +168,7 @@ async def _without_watch(connection: Connection, target: Target, confirmed: Conf
 async def _is_twin(connection: Connection, target: Target) -> bool:
     """What it answers now counts: another device may stand behind the address since it was asked last."""
     if DEVICE_NAME not in target.description.entries:
-        return False
+        return await connection.buses[target.device.bus].tells_twin(target.node)
     try:
         name = await connection.driver(target).read(target.node, DEVICE_NAME, ASK_TIMEOUT_S)
     except HubsideError:

@@ -5,16 +5,12 @@ Positions and speeds are in the units of 607Ah and 60FFh: degrees and degrees a 
 
 from __future__ import annotations
 
-import asyncio
 from math import inf
 from typing import Final
 
 from app.errors import UnverifiedError, UsageError
 from app.model.address import Address
 from app.model.axis_state import AxisState
-from app.model.checks import Allow
-from app.model.datatypes import Raw
-from app.model.values import parse
 from app.service.journal import Journal, Kind
 from app.service.motion.bounds import (
     TARGET_POSITION,
@@ -31,18 +27,16 @@ from app.service.motion.control import (
     AxisMode,
     Control,
     Word,
+    cia402,
 )
 from app.service.motion.desk import MotionDesk
 from app.service.motion.home_methods import searches
 from app.service.motion.interlocks import POSITION
-from app.service.motion.running import Doing, Ended, Running
-from app.service.write import know_what_it_rests_on, write_raw
+from app.service.motion.running import STOPPING, Doing, Ended, Running
+from app.service.motion.steps import raw_of, set_object, wait
 
 PROFILE_VELOCITY: Final = Address(0x6081)
 WINDOW: Final = Address(0x6067)
-STOPPING: Final = (Ended.SILENT, Ended.LEASE, Ended.LINK, Ended.INTERLOCK)
-"""A quick stop is under way."""
-_LOOK_S: Final = 0.02
 _HOME_TOLERANCE_DEG: Final = 0.1
 _MARGIN_S: Final = 0.25
 """A jog ends so long before the software limit: what the ramp and the last look take."""
@@ -56,7 +50,7 @@ async def jog(desk: MotionDesk, slug: str, fence: int, speed: float, journal: Jo
     require_by_hand(desk.connection, desk.connection.target(slug), speed)
 
     async def work(running: Running) -> None:
-        control = running.control
+        control = cia402(running.control)
         await require_speed(desk.connection, control, speed)
         raw = await raw_of(control, TARGET_VELOCITY, speed)
         await control.set_mode(AxisMode.PROFILE_VELOCITY)
@@ -83,7 +77,7 @@ async def move_to(desk: MotionDesk, slug: str, fence: int, position: float, spee
     require_by_hand(desk.connection, desk.connection.target(slug), speed)
 
     async def work(running: Running) -> None:
-        control = running.control
+        control = cia402(running.control)
         await require_speed(desk.connection, control, speed)
         await require_within(control, position)
         await control.set_mode(AxisMode.PROFILE_POSITION)
@@ -113,7 +107,7 @@ async def reset_fault(desk: MotionDesk, slug: str, fence: int, journal: Journal)
     found: list[AxisState] = []
 
     async def work(running: Running) -> None:
-        found.append(await running.control.reset_fault())
+        found.append(await cia402(running.control).reset_fault())
         journal.note(Kind.FAULT_RESET, slug, state=found[0].name.lower())
 
     await desk.without_proof(slug, fence, Doing.RESET, work)
@@ -124,7 +118,7 @@ async def hold(desk: MotionDesk, slug: str, fence: int) -> None:
     """Have the axis enabled and standing, brake lifted, while it is held. Raises what ``MotionDesk.move`` raises."""
 
     async def work(running: Running) -> None:
-        control = running.control
+        control = cia402(running.control)
         await control.set_mode(AxisMode.PROFILE_VELOCITY)
         if running.over.is_set():
             return
@@ -149,7 +143,7 @@ async def home(desk: MotionDesk, slug: str, fence: int, position: float, journal
         raise UsageError(reason=f"{slug} is homed by a method of 6098h")
 
     async def work(running: Running) -> None:
-        control = running.control
+        control = cia402(running.control)
         await control.require_at_rest()
         await control.set_mode(AxisMode.HOMING)
         await set_object(control, TARGET_POSITION, await raw_of(control, TARGET_POSITION, position), journal)
@@ -175,7 +169,7 @@ async def until_over(running: Running) -> None:
 
 async def _go_on(running: Running) -> None:
     """One look at an axis that is to stay enabled."""
-    control = running.control
+    control = cia402(running.control)
     if control.overtaken or await control.state() is not AxisState.OPERATION_ENABLED:
         running.end(Ended.STOPPED)
     else:
@@ -184,7 +178,7 @@ async def _go_on(running: Running) -> None:
 
 async def _until_limit(running: Running, speed: float) -> None:
     """Wait until it is let go, or until the axis comes near the limit towards which it turns."""
-    control = running.control
+    control = cia402(running.control)
     low, high = await ends_of(control)
     margin = way_per_s(control.target, speed) * _MARGIN_S if (low, high) != (-inf, inf) else 0.0
     while not running.over.is_set():
@@ -200,7 +194,7 @@ async def _until_reached(running: Running) -> None:
         status = await running.control.status()
         if running.control.overtaken or AxisState.of(status) is not AxisState.OPERATION_ENABLED:
             running.end(Ended.STOPPED)
-        elif status & TARGET_REACHED and not status & ACKNOWLEDGED and await _is_there(running.control):
+        elif status & TARGET_REACHED and not status & ACKNOWLEDGED and await _is_there(cia402(running.control)):
             running.end(Ended.DONE)
         else:
             await wait(running)
@@ -214,14 +208,6 @@ async def _is_there(control: Control) -> bool:
     return far <= await control.number(WINDOW)
 
 
-async def wait(running: Running) -> None:
-    """Until the next look, or until it is over."""
-    try:
-        await asyncio.wait_for(running.over.wait(), _LOOK_S)
-    except TimeoutError:
-        return
-
-
 async def come_to_rest(running: Running, halt: bool = True) -> None:
     """Halt, wait until the blade stands, then no power and the brake engaged.
 
@@ -229,7 +215,7 @@ async def come_to_rest(running: Running, halt: bool = True) -> None:
     axis that was told to run: its word enables any other. One that has left its operation by itself is not to find the
     word that stands when it could run again. Without ``halt`` the axis stops by what was sent already.
     """
-    control = running.control
+    control = cia402(running.control)
     if running.why in STOPPING or control.overtaken:
         return
     if running.why is Ended.STOPPED:
@@ -252,16 +238,3 @@ async def _require_at(control: Control, angle_deg: float) -> None:
             found=f"{found_deg:g}",
             reason_key="unverified.elsewhere",
         )
-
-
-async def set_object(control: Control, address: Address, raw: Raw, journal: Journal) -> None:
-    """Write an object that moves an axis. Raises what ``write_raw`` raises."""
-    await write_raw(control.driver, control.target, address, raw, journal, allow=Allow.MOTION)
-
-
-async def raw_of(control: Control, address: Address, number: float) -> Raw:
-    """What an object holds for a scaled number. Raises LimitError and what reading raises."""
-    target = control.target
-    entry = target.entry(address)
-    await know_what_it_rests_on(control.driver, target, entry)
-    return parse(target.description, entry, f"{number:.3f}".rstrip("0").rstrip("."), target.lookup)

@@ -23,11 +23,12 @@ from app.errors import (
     OvertakenError,
 )
 from app.model.address import Address
-from app.model.axis_state import ENERGISED, AxisState
+from app.model.axis_state import AxisState
 from app.model.checks import Allow
 from app.service.devices import decode
 from app.service.journal import Journal, Kind
-from app.service.motion.control import MODE_SHOWN, REMOTE, AxisMode, Control
+from app.service.motion.commanding import Commanding
+from app.service.motion.control import REMOTE, AxisMode, cia402
 from app.service.motion.heartbeat import Heartbeat
 from app.service.motion.left import Changed, Left
 from app.service.write import write_raw
@@ -61,7 +62,7 @@ class Prepared:
     ``unwatched``: its bus has nothing by which it could, and it may move all the same (``Interlock.SELF_STOP``).
     """
 
-    control: Control
+    control: Commanding
     settings: dict[Address, bytes] = field(default_factory=dict)
     proof_s: float | None = None
     unwatched: bool = False
@@ -94,7 +95,7 @@ async def set_up(axis: Prepared, heartbeat: Heartbeat, left: Left, journal: Jour
     control = axis.control
     entry = await _free_consumer(control, heartbeat.node)
     watch = (heartbeat.node << 16 | CONSUMER_MS).to_bytes(4, "little")
-    await left.note_mode(axis.slug, await control.number(MODE_SHOWN))
+    await left.note_mode(axis.slug, await control.mode())
     await _change(axis, ABORT_CONNECTION, QUICK_STOP.to_bytes(2, "little"), left, journal)
     await _change(axis, entry, watch, left, journal)
     heartbeat.watch(axis.slug)
@@ -114,15 +115,15 @@ async def take_unwatched(axis: Prepared, heartbeat: Heartbeat, left: Left) -> No
     Raises InterlockError where it has power: somebody else has it. And what reading raises, StoreError.
     """
     control = axis.control
-    await left.note_mode(axis.slug, await control.number(MODE_SHOWN))
-    if await control.state() in ENERGISED:
+    await left.note_mode(axis.slug, await control.mode())
+    if await control.has_power():
         raise InterlockError(device=axis.slug, interlock="running", reason_key="interlock.reason.has_power")
     control.require_own()
     heartbeat.watch(axis.slug)
     axis.unwatched = True
 
 
-async def _free_consumer(control: Control, node: int) -> Address:
+async def _free_consumer(control: Commanding, node: int) -> Address:
     """An entry of 1016h that watches nobody, or us already. Raises InterlockError where there is none."""
     entries = sorted(a for a in control.target.description.entries if a.major == CONSUMER and a.minor > 0)
     found = await control.driver.read_many(control.target.node, entries)
@@ -151,7 +152,7 @@ async def _change(axis: Prepared, address: Address, data: bytes, left: Left, jou
     axis.settings[address] = data
 
 
-async def _write(control: Control, address: Address, data: bytes, journal: Journal) -> None:
+async def _write(control: Commanding, address: Address, data: bytes, journal: Journal) -> None:
     raw = decode(control.target.entry(address), data)
     # A test signal may have left a PDO switched on (borrowed.py).
     await write_raw(control.driver, control.target, address, raw, journal, allow=Allow.COMMUNICATION)
@@ -176,7 +177,7 @@ async def prove(axis: Prepared, heartbeat: Heartbeat, held: Callable[[], bool]) 
 
     Raises InterlockError where it went on, NotHeldError where it was let go meanwhile.
     """
-    control = axis.control
+    control = cia402(axis.control)
     axis.void()
     await control.set_mode(AxisMode.PROFILE_VELOCITY)
     try:
@@ -210,13 +211,14 @@ def _not_proven(axis: Prepared, reason: str, seconds: float | None = None) -> In
     return InterlockError(device=axis.slug, interlock="proof", reason_key=key, seconds=seconds)
 
 
-async def after_proof(control: Control) -> None:
+async def after_proof(axis: Prepared) -> None:
     """What the missing heartbeat left is reset, and the axis has no power.
 
     Its fault may have opened the safety chain: then the blades are on their way to feather, and that is waited for.
     Raises InterlockError where the fault stays, OvertakenError where somebody else has commanded the axis meanwhile: a
     FEATHER must not end by what this sends.
     """
+    control = cia402(axis.control)
     await control.until({AxisState.FAULT, AxisState.SWITCH_ON_DISABLED, AxisState.READY}, FEATHER_TIMEOUT_S)
     if not await control.status() & REMOTE or await control.state() is AxisState.FAULT:
         state = await control.reset_fault()
@@ -227,7 +229,7 @@ async def after_proof(control: Control) -> None:
     await control.switch_off()
 
 
-async def put_back(control: Control, left: Left, journal: Journal) -> None:
+async def put_back(control: Commanding, left: Left, journal: Journal) -> None:
     """Write what stood there before, newest first, the mode last. What no longer holds what we wrote is left as it is.
 
     An axis that has power keeps its watch: it is waited for, then InterlockError. Raises what reading and writing
@@ -243,7 +245,7 @@ async def put_back(control: Control, left: Left, journal: Journal) -> None:
     await _mode_back(control, left)
 
 
-async def _mode_back(control: Control, left: Left) -> None:
+async def _mode_back(control: Commanding, left: Left) -> None:
     """The axis gets its mode back; where that cannot be now, it stays noted. Raises StoreError."""
     slug = control.target.slug
     changed = left.mode_of(slug)
@@ -254,7 +256,7 @@ async def _mode_back(control: Control, left: Left) -> None:
         log.warning("%s: its mode is not put back: %s", slug, error.code)
 
 
-async def give_nmt_back(control: Control, left: Left, journal: Journal) -> None:
+async def give_nmt_back(control: Commanding, left: Left, journal: Journal) -> None:
     """The node gets the NMT state back that it had. Raises BusLostError, ConsentError, StoreError."""
     slug = control.target.slug
     before = left.nmt_of(slug)
@@ -265,7 +267,7 @@ async def give_nmt_back(control: Control, left: Left, journal: Journal) -> None:
         await left.forget_nmt(slug)
 
 
-async def _until_operational(control: Control) -> None:
+async def _until_operational(control: Commanding) -> None:
     """Wait until the node says that it is operational. Raises InterlockError."""
     target, loop = control.target, asyncio.get_running_loop()
     end_s = loop.time() + _NMT_TIMEOUT_S

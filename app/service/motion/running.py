@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import asyncio
 from dataclasses import dataclass, field
-from enum import Enum
+from enum import Enum, IntEnum
+from typing import Final
 
 from app.errors import HubsideError
-from app.service.motion.control import Control, Word
+from app.service.motion.commanding import Commanding
 
 
 class Doing(Enum):
@@ -39,21 +40,25 @@ class Ended(Enum):
     FAILED = "failed"
 
 
+STOPPING: Final = (Ended.SILENT, Ended.LEASE, Ended.LINK, Ended.INTERLOCK)
+"""A quick stop was sent already."""
+
+
 @dataclass
 class Running:
     """A motion under way.
 
     ``held``: it goes on only while its person holds it; ``turning``: the axis was told to run; ``let_go``: the word by
-    which it stops when its person lets go.
+    which it stops when its person lets go, None: by its ramp.
     """
 
     slug: str
     doing: Doing
-    control: Control
+    control: Commanding
     held: bool
     order: int = 0
     turning: bool = False
-    let_go: Word = Word.HALT
+    let_go: IntEnum | None = None
     why: Ended | None = None
     task: asyncio.Task[None] | None = None
     over: asyncio.Event = field(default_factory=asyncio.Event)
