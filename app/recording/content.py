@@ -16,6 +16,8 @@ METADATA_RECORDING: Final = "recording"
 METADATA_BIT_RATES: Final = "bit_rates"
 METADATA_NODES: Final = "nodes"
 METADATA_SERVERS: Final = "servers"
+METADATA_PROTOCOLS: Final = "protocols"
+METADATA_ORDERS: Final = "orders"
 METADATA_VERSIONS: Final = "versions"
 METADATA_TOTALS: Final = "totals"
 METADATA_RECOVERY: Final = "recovery"
@@ -97,7 +99,9 @@ def from_stored(stored: AttachedFile) -> AttachedFile:
 class RecordingInfo:
     """What a recording is of. ``bit_rates`` in bit/s by bus; ``nodes`` maps ``can0/11`` to slug and description.
 
-    ``servers`` maps a node of a Modbus TCP bus to its ``host:port``.
+    ``servers`` maps a node of a Modbus TCP bus to its ``host:port``. ``protocols`` names what is spoken on buses where
+    neither their messages nor ``servers`` tell it (``profibus-dp``); ``orders`` maps a node on PROFIBUS to the order of
+    its process data as the site says it (``low-high``).
     """
 
     turbine: str
@@ -106,6 +110,8 @@ class RecordingInfo:
     nodes: Mapping[str, str] = field(default_factory=dict)
     versions: Mapping[str, str] = field(default_factory=dict)
     servers: Mapping[str, str] = field(default_factory=dict)
+    protocols: Mapping[str, str] = field(default_factory=dict)
+    orders: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from app.errors import UsageError
-from app.model.description import Description
+from app.model.description import Bus, Description
 from app.model.description_file import load_builtin
 from app.model.site import MAX_NODE
+from app.wire.profibus.fdl import MAX_ADDRESS
+from app.wire.profibus.order_proof import order_text, read_order
+from app.wire.profibus.pzd import Order
 
 NodeKey = tuple[str, int]
 """Bus and node."""
 ServerTable = Mapping[NodeKey, str]
 """``host:port`` of the nodes of Modbus TCP buses."""
+OrderTable = Mapping[NodeKey, Order]
+"""What a site says of the process data of nodes on PROFIBUS."""
+_MOST: Final = {**MAX_NODE, Bus.PROFIBUS_DP: MAX_ADDRESS}
 
 
 class NodeName(NamedTuple):
@@ -42,7 +48,7 @@ def described(table: Mapping[str, str]) -> dict[NodeKey, Description]:
             description = load_builtin(name.description_id)
         except UsageError:
             continue
-        if 1 <= node <= MAX_NODE.get(description.bus, 0):
+        if 1 <= node <= _MOST.get(description.bus, 0):
             found[bus, node] = description
     return found
 
@@ -60,3 +66,26 @@ def read_servers(table: Mapping[str, str]) -> dict[NodeKey, str]:
 def server_table(servers: ServerTable) -> dict[str, str]:
     """What ``read_servers`` reads."""
     return {f"{bus}/{node}": server for (bus, node), server in servers.items()}
+
+
+def read_orders(table: Mapping[str, str]) -> dict[NodeKey, Order]:
+    """The table ``orders`` (``dp0/6``: ``low-high``); what names no node or no order is passed over."""
+    found = {}
+    for key, text in table.items():
+        bus, _, number = key.rpartition("/")
+        try:
+            found[bus, int(number)] = read_order(text)
+        except ValueError:
+            continue
+    return found
+
+
+def order_table(orders: OrderTable) -> dict[str, str]:
+    """What ``read_orders`` reads."""
+    return {f"{bus}/{node}": order_text(order) for (bus, node), order in orders.items()}
+
+
+def read_protocols(table: Mapping[str, str]) -> dict[str, Bus]:
+    """The table ``protocols`` (``dp0``: ``profibus-dp``); one that is not known is passed over."""
+    known = {one.value: one for one in Bus}
+    return {bus: known[name] for bus, name in table.items() if name in known}

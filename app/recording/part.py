@@ -15,6 +15,8 @@ from app.recording.chunks import Body, Level, can_body, compressor, encode_chunk
 from app.recording.content import (
     METADATA_BIT_RATES,
     METADATA_NODES,
+    METADATA_ORDERS,
+    METADATA_PROTOCOLS,
     METADATA_RECORDING,
     METADATA_SERVERS,
     METADATA_TOTALS,
@@ -112,15 +114,20 @@ class Part:
         )
         file.add_metadata(METADATA_BIT_RATES, {bus: str(rate) for bus, rate in info.bit_rates.items()})
         file.add_metadata(METADATA_NODES, info.nodes)
-        if info.servers:
-            file.add_metadata(METADATA_SERVERS, info.servers)
+        for name, table in (
+            (METADATA_SERVERS, info.servers),
+            (METADATA_PROTOCOLS, info.protocols),
+            (METADATA_ORDERS, info.orders),
+        ):
+            if table:
+                file.add_metadata(name, table)
         file.add_metadata(METADATA_VERSIONS, info.versions)
         for attachment in attachments:
             self.attach(attachment, identity.created_ns)
         self._schemas = {message_type: file.add_schema(message_type) for message_type in ALL_TYPES}
         for topic, message_type in ((CLOCK_TOPIC, CLOCK), (STATE_TOPIC, STATE), (EVENTS_TOPIC, EVENT)):
             self._channel(topic, message_type)
-        for bus in info.bit_rates:
+        for bus in (bus for bus in info.bit_rates if bus not in info.protocols):
             self._channel(bus_topic(bus), CAN_FRAME)
         sync_directory(self.path.parent)
 

@@ -10,6 +10,7 @@ import json
 import mmap
 import struct
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from functools import cached_property
 from heapq import heapify, heappop, heapreplace
 from pathlib import Path
 from types import MappingProxyType
@@ -19,7 +20,7 @@ import numpy as np
 from mcap.records import Attachment, Channel, Chunk, ChunkIndex, Header, Metadata, Schema
 
 from app.errors import RecordingError
-from app.model.description import Description
+from app.model.description import Bus, Description
 from app.recording.cdr import (
     MESSAGE_FIXED,
     OP_MESSAGE,
@@ -38,6 +39,8 @@ from app.recording.content import (
     METADATA_BIT_RATES,
     METADATA_CHUNK_CHANNELS,
     METADATA_NODES,
+    METADATA_ORDERS,
+    METADATA_PROTOCOLS,
     METADATA_RECORDING,
     METADATA_SERVERS,
     METADATA_TOTALS,
@@ -53,7 +56,7 @@ from app.recording.content import (
 from app.recording.file_bytes import FileBytes
 from app.recording.foreign import is_foreign, read_foreign
 from app.recording.loose import bodies_in, frames_in, messages_in, payloads_in
-from app.recording.node_table import ServerTable, described, read_servers
+from app.recording.node_table import OrderTable, ServerTable, described, read_orders, read_protocols, read_servers
 from app.recording.part import Identity
 from app.recording.scan import (
     Bytes,
@@ -71,7 +74,7 @@ from app.recording.scan import (
 )
 from app.recording.schemas import CAN_FRAME, CLOCK, EVENT, STATE, TELEGRAM, MessageType
 from app.recording.summary import MAGIC, Summary
-from app.wire.frame import Direction, Frame
+from app.wire.frame import Direction, Fdl, Frame
 
 _PREFIX: Final = RECORD_PREFIX.size + MESSAGE_FIXED
 _MESSAGE: Final = bytes((OP_MESSAGE,))
@@ -231,6 +234,32 @@ class Recording:
         return read_servers(self.metadata.get(METADATA_SERVERS, {}))
 
     @property
+    def orders(self) -> OrderTable:
+        """What a site says of the process data of nodes on PROFIBUS, by bus and node."""
+        return read_orders(self.metadata.get(METADATA_ORDERS, {}))
+
+    @cached_property
+    def kinds(self) -> Mapping[str, Bus]:
+        """What is spoken on each bus: as the file says, else as its messages show."""
+        found = {bus: Bus.MODBUS_TCP for bus, _ in self.servers}
+        found |= read_protocols(self.metadata.get(METADATA_PROTOCOLS, {}))
+        for channel in self.channels.values():
+            bus, name = channel.topic[1:], self._type_name(channel)
+            if bus not in found and name in _FRAME_TYPES:
+                found[bus] = Bus.CANOPEN if name == CAN_FRAME.name else self._kind_of_telegrams(bus)
+        return found
+
+    def _kind_of_telegrams(self, bus: str) -> Bus:
+        for place in self.telegram_chunks((bus,)):
+            try:
+                frames = self.telegrams(place)
+            except ValueError:
+                continue  # who reads it for its content tells the damage
+            if frames:
+                return Bus.PROFIBUS_DP if isinstance(frames[0].payload, Fdl) else Bus.MODBUS_TCP
+        return Bus.MODBUS_TCP
+
+    @property
     def info(self) -> RecordingInfo:
         """What the recording is of; nothing is known of files of others.
 
@@ -247,6 +276,8 @@ class Recording:
             nodes=dict(tables.get(METADATA_NODES, {})),
             versions=dict(tables.get(METADATA_VERSIONS, {})),
             servers=dict(tables.get(METADATA_SERVERS, {})),
+            protocols=dict(tables.get(METADATA_PROTOCOLS, {})),
+            orders=dict(tables.get(METADATA_ORDERS, {})),
         )
 
     @property

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from threading import Lock
 from typing import Final
 
-from app.model.description import Description
+from app.model.description import Bus, Description
 from app.recording.content import EventKind
 from app.recording.index.course import GAP_REASONS
 from app.service.trace.log import BusTrace
@@ -14,11 +14,14 @@ from app.wire.busload import EXTENDED_KEY, BusLoad, LoadSecond
 from app.wire.can_bits import frame_bits
 from app.wire.decoder import CanOpenDecoder
 from app.wire.decoders import BusDecoder, decoder_of
-from app.wire.frame import Adu, Can, Frame
+from app.wire.frame import Adu, Can, Fdl, Frame
 from app.wire.live import LiveState
 from app.wire.modbus.adu import ETHERNET_BPS, wire_bits
 from app.wire.modbus.decoder import ModbusDecoder
 from app.wire.pdo_follower import PdoRoute
+from app.wire.profibus import fdl
+from app.wire.profibus.owners import Owners
+from app.wire.profibus.pzd import Order
 from app.wire.records import Record
 
 GAP_REASON: Final = GAP_REASONS[EventKind.BUS_LOST]
@@ -28,7 +31,9 @@ class BusFeed:
     """Frames of a bus go through the decoder into the live state and count as bus load.
 
     ``lock`` is shared by all buses of a stage, because the live state has one writer at a time. ``descriptions`` by
-    node; ``bitrate`` in bit/s. ``servers``: ``host:port`` by node, where it is a Modbus TCP bus.
+    node; ``bitrate`` in bit/s. ``servers``: ``host:port`` by node, where it is a Modbus TCP bus. ``kind`` is what is
+    spoken on it, None: as what stands there does. ``orders``: what a site says of the process data of stations on
+    PROFIBUS.
     """
 
     def __init__(
@@ -39,14 +44,17 @@ class BusFeed:
         live: LiveState,
         lock: Lock,
         servers: Mapping[int, str] | None = None,
+        kind: Bus | None = None,
+        orders: Mapping[int, Order] | None = None,
     ) -> None:
         self.name = name
         self.bitrate = bitrate
-        self.decoder: BusDecoder = decoder_of(name, descriptions, servers)
+        self.decoder: BusDecoder = decoder_of(name, descriptions, servers, kind, orders)
         self._can = self.decoder if isinstance(self.decoder, CanOpenDecoder) else None
         self._modbus = self.decoder if isinstance(self.decoder, ModbusDecoder) else None
+        self._owners = Owners()
         self.load = BusLoad(bitrate if self._modbus is None else ETHERNET_BPS)
-        self.trace = BusTrace(name, self.decoder, lock, servers)
+        self.trace = BusTrace(name, self.decoder, lock, servers, orders)
         self.frames = 0
         self._live = live
         self._lock = lock
@@ -62,21 +70,24 @@ class BusFeed:
         """Count and decode frames of this bus."""
         with self._lock:
             self.frames += len(frames)
-            count = self.load.feed
-            if self._modbus is not None:
-                for frame in frames:
-                    if isinstance(frame.payload, Adu):
-                        count(frame.t_ns, wire_bits(len(frame.payload.data)), self._modbus.node_of(frame))
-            else:
-                for t_ns, _, _, can, _ in frames:
-                    if type(can) is Can:
-                        count(t_ns, frame_bits(can), can.can_id, can.extended)
+            self._count(frames)
             self.trace.take(frames)
             records = self.decoder.feed_all(frames)
             if records:
                 self.trace.heard(records)
                 self._heard(records)
                 self._live.apply_all(records)
+
+    def _count(self, frames: Sequence[Frame]) -> None:
+        count = self.load.feed
+        for frame in frames:
+            t_ns, _, _, payload, _ = frame
+            if type(payload) is Can:
+                count(t_ns, frame_bits(payload), payload.can_id, payload.extended)
+            elif type(payload) is Fdl:
+                count(t_ns, fdl.wire_bits(len(payload.data)), self._owners.of(payload.data))
+            elif type(payload) is Adu and self._modbus is not None:
+                count(t_ns, wire_bits(len(payload.data)), self._modbus.node_of(frame))
 
     def gap(self, t_ns: int, reason: str = GAP_REASON) -> None:
         """Frames are missing before ``t_ns``: what was read until then proves nothing any more."""

@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from app.drivers.contract import DriverStatus, LinkState, MasterSign
 from app.errors import RecordingError, UsageError
-from app.model.description import Description
+from app.model.description import Bus, Description
 from app.model.site import Device, Turbine
 from app.recording.content import RecorderClock
 from app.recording.writer import RecorderStatus
@@ -198,6 +198,7 @@ class Connection:
                 for bus in self.turbine.buses
                 for node, server in self.turbine.servers(bus.name).items()
             },
+            protocols={bus.name: bus.kind.value for bus in self.turbine.buses if bus.kind is Bus.PROFIBUS_DP},
             nodes={f"{t.device.bus}/{t.node}": f"{t.slug} {t.description.id}" for t in self._targets.values()},
             descriptions={t.description.id: t.description for t in self._targets.values()}.values(),
         )

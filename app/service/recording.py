@@ -28,7 +28,10 @@ _KINDS: Final = {
 
 @dataclass(frozen=True, slots=True)
 class Subject:
-    """What is recorded. ``nodes`` maps ``can0/11`` to slug and description; ``servers`` a node to ``host:port``."""
+    """What is recorded. ``nodes`` maps ``can0/11`` to slug and description; ``servers`` a node to ``host:port``.
+
+    ``protocols`` and ``orders`` as in ``RecordingInfo``.
+    """
 
     turbine: str
     person: str
@@ -36,6 +39,8 @@ class Subject:
     nodes: Mapping[str, str]
     descriptions: Iterable[Description]
     servers: Mapping[str, str] = field(default_factory=dict)
+    protocols: Mapping[str, str] = field(default_factory=dict)
+    orders: Mapping[str, str] = field(default_factory=dict)
 
 
 class Recording:
@@ -55,6 +60,8 @@ class Recording:
             bit_rates=dict(subject.bit_rates),
             nodes=dict(subject.nodes),
             servers=dict(subject.servers),
+            protocols=dict(subject.protocols),
+            orders=dict(subject.orders),
             versions={"hubside": __version__, "python": platform.python_version()},
         )
         attached = [

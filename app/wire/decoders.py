@@ -11,6 +11,7 @@ from app.wire.frame import Adu, Fdl, Frame
 from app.wire.modbus.decoder import ModbusDecoder
 from app.wire.pdo_follower import PdoRoute
 from app.wire.profibus.decoder import ProfibusDecoder
+from app.wire.profibus.pzd import Order
 from app.wire.records import Record
 
 
@@ -42,13 +43,23 @@ class BusDecoder(Protocol):
 
 
 def decoder_of(
-    bus: str, descriptions: Mapping[int, Description] | None = None, servers: Mapping[int, str] | None = None
+    bus: str,
+    descriptions: Mapping[int, Description] | None = None,
+    servers: Mapping[int, str] | None = None,
+    kind: Bus | None = None,
+    orders: Mapping[int, Order] | None = None,
 ) -> BusDecoder:
-    """The decoder of ``bus``. ``servers`` are the ``host:port`` of its nodes where it is Modbus TCP, None elsewhere."""
-    speaks = {one.bus for one in (descriptions or {}).values()}
+    """The decoder of ``bus``. ``servers`` are the ``host:port`` of its nodes where it is Modbus TCP, None elsewhere.
+
+    ``kind`` is what is spoken on it, None: as what stands there does. ``orders`` are what a site says of the process
+    data of its nodes on PROFIBUS.
+    """
+    speaks = {one.bus for one in (descriptions or {}).values()} if kind is None else {kind}
     if servers is not None or Bus.MODBUS_TCP in speaks:
         return ModbusDecoder(bus, {server: node for node, server in (servers or {}).items()})
-    return ProfibusDecoder(bus, descriptions) if Bus.PROFIBUS_DP in speaks else CanOpenDecoder(bus, descriptions)
+    if Bus.PROFIBUS_DP in speaks:
+        return ProfibusDecoder(bus, descriptions, orders)
+    return CanOpenDecoder(bus, descriptions)
 
 
 def decoder_of_state(bus: str, state: Mapping[str, Any]) -> BusDecoder:

@@ -10,7 +10,20 @@ from typing import Any, Final, NamedTuple
 from app.model.description import Description
 from app.wire.emcy import NO_ERROR, emcy_text_key
 from app.wire.modbus.functions import exception_text_key
-from app.wire.records import EmcySeen, FaultSeen, Outcome, SdoAccess, SdoSeen, TransactionSeen
+from app.wire.profibus.diagnosis import Status
+from app.wire.profibus.pkw import error_text_key
+from app.wire.records import (
+    DiagnosisSeen,
+    EmcySeen,
+    FaultSeen,
+    Outcome,
+    Protocol,
+    SdoAccess,
+    SdoSeen,
+    SlaveSeen,
+    SlaveState,
+    TransactionSeen,
+)
 from app.wire.sdo import Abort, abort_text_key
 
 
@@ -36,6 +49,10 @@ class EventKind(Enum):
     LOAD_FAILED = "load_failed"
     REQUEST_REFUSED = "request_refused"
     """A Modbus request that is no access to one object was refused."""
+    SLAVE_STATE = "slave_state"
+    """A PROFIBUS slave came, went, or went into another state."""
+    DIAGNOSIS = "diagnosis"
+    """A PROFIBUS slave tells another diagnosis than before."""
     STORED_DIFFERS = "stored_differs"
     """What a device holds after a restart is not what it acknowledged to save."""
     GAP = "gap"
@@ -136,6 +153,9 @@ def tell_sdo(seen: SdoSeen) -> Told | None:
     details: dict[str, Any] = {"address": seen.address.short, "access": seen.access.value}
     writing = seen.access is SdoAccess.WRITE
     severity = Severity.WARNING if writing else Severity.INFO
+    if seen.protocol is Protocol.PKW and seen.outcome is Outcome.ABORTED and seen.abort_code is not None:
+        details |= {"code": seen.abort_code, "reason_key": error_text_key(seen.abort_code)}
+        return Told(EventKind.SDO_ABORTED, severity, "event.pkw_refused", details)
     if seen.outcome is Outcome.ABORTED and seen.abort_code is not None and seen.aborted_by is not None:
         details |= {
             "abort_code": seen.abort_code,
@@ -162,6 +182,22 @@ def tell_transaction(seen: TransactionSeen) -> Told | None:
     kind = EventKind.REQUEST_REFUSED
     details = {"function": seen.function, "code": code, "reason_key": reason_key}
     return Told(kind, Severity.WARNING, kind.text_key, details)
+
+
+def tell_slave(seen: SlaveSeen) -> Told:
+    """A slave that is gone is a warning: who runs it tells more of it."""
+    severity = Severity.WARNING if seen.state is SlaveState.ABSENT else Severity.INFO
+    return Told(EventKind.SLAVE_STATE, severity, EventKind.SLAVE_STATE.text_key, {"state_key": seen.state.text_key})
+
+
+def tell_diagnosis(seen: DiagnosisSeen) -> Told:
+    """The first of what is wrong stands for the rest; waiting for parameters is how every slave begins."""
+    status = Status(seen.status)
+    keys = status.faults.text_keys or status.text_keys or ["profibus.status.none"]
+    begins = Status.NOT_READY | Status.PARAMETERS_REQUIRED
+    severity = Severity.WARNING if status.faults & ~begins else Severity.INFO
+    details = {"status_hex": f"{seen.status:06X}h", "ident_hex": f"{seen.ident:04X}h", "reason_key": keys[0]}
+    return Told(EventKind.DIAGNOSIS, severity, EventKind.DIAGNOSIS.text_key, details)
 
 
 def tell_emcy(seen: EmcySeen, description: Description | None) -> Told:

@@ -20,9 +20,11 @@ from app.wire.events import (
     EventLog,
     Severity,
     Told,
+    tell_diagnosis,
     tell_emcy,
     tell_fault,
     tell_sdo,
+    tell_slave,
     tell_transaction,
 )
 from app.wire.frame import Direction
@@ -447,7 +449,8 @@ class LiveState:
 
     def _on_malformed_adu(self, seen: MalformedAduSeen) -> None:
         details = {"fault_key": seen.fault.text_key, "offset": seen.offset, "link": seen.link, "data": seen.data.hex()}
-        told = Told(EventKind.MALFORMED, Severity.WARNING, "event.malformed_adu", details)
+        key = "event.malformed_adu" if seen.link else "event.malformed_fdl"
+        told = Told(EventKind.MALFORMED, Severity.WARNING, key, details)
         self._add_event(seen.t_ns, seen.bus, seen.node, told)
 
     def _on_slave(self, seen: SlaveSeen) -> None:
@@ -455,9 +458,15 @@ class LiveState:
         self._see(node)
         node.silent = seen.state is SlaveState.ABSENT
         self._touch_node(node)
+        self._add_event(seen.t_ns, seen.bus, seen.node, tell_slave(seen))
 
     def _on_diagnosis(self, seen: DiagnosisSeen) -> None:
-        self._see(self._node(seen.bus, seen.node))
+        node = self._node(seen.bus, seen.node)
+        self._see(node)
+        told = f"{seen.status:06X} {seen.ident:04X} {seen.extended.hex()}"
+        if told != node.diagnosis:
+            node.diagnosis = told
+            self._add_event(seen.t_ns, seen.bus, seen.node, tell_diagnosis(seen))
 
     # -- bookkeeping -------------------------------------------------------------
 

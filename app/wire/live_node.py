@@ -40,7 +40,7 @@ class LiveNode:
     """All that is kept of a node. ``seen``: it has said something itself."""
 
     __slots__ = (
-        "answered_ns", "boot_ns", "boots", "bus", "commanded", "emcy_code", "emcy_ns", "first_interval_ns",
+        "answered_ns", "boot_ns", "boots", "bus", "commanded", "diagnosis", "emcy_code", "emcy_ns", "first_interval_ns",
         "heartbeat_ns", "interval_ns", "memory", "number", "other_client_ns", "period_ns", "reset_communication",
         "seen", "silent", "state", "version",
     )  # fmt: skip
@@ -63,6 +63,8 @@ class LiveNode:
         self.emcy_ns: int | None = None
         self.other_client_ns: int | None = None
         self.answered_ns: int | None = None
+        self.diagnosis: str | None = None
+        """What a PROFIBUS slave told of itself last, to tell what is new."""
         self.reset_communication = False
         self.version = 0
 
@@ -99,5 +101,5 @@ class LiveNode:
 
 
 _KEPT: Final = tuple(name for name in LiveNode.__slots__ if name not in ("bus", "number", "memory", "version"))
-_ADDED: Final = frozenset({"answered_ns"})
+_ADDED: Final = frozenset({"answered_ns", "diagnosis"})
 """Not in states of older recordings."""

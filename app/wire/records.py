@@ -323,6 +323,11 @@ class SlaveState(Enum):
     WAITING = "waiting"
     EXCHANGING = "exchanging"
 
+    @property
+    def text_key(self) -> str:
+        """Text key of what it does."""
+        return f"profibus.slave.{self.value}"
+
 
 class SlaveSeen(NamedTuple):
     """A PROFIBUS slave went into another state: found, lost, ready or not."""

@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 
 from app.model.address import Address
 from app.model.datatypes import DataType
-from app.model.description import Description
+from app.model.description import Bus, Description
 from app.recording.can_table import Block
 from app.recording.columns.blocks import Span, can_blocks
 from app.recording.columns.follow import BusFollower
@@ -46,7 +46,7 @@ def samples(
 
     The same values at the same times as the decoder of the bus sees them by process data, parameter traffic and
     emergency message, fed with the frames since the last keyframe at or before the start; without one, with all frames
-    from the beginning of the file. CAN is read by columns; of Modbus TCP every ADU is decoded.
+    from the beginning of the file. CAN is read by columns; of other buses every telegram is decoded.
     Where the file cannot be read the recording's ``damages`` tell. Raises ``RecordingError`` as ``open_recording``
     does.
     """
@@ -55,9 +55,11 @@ def samples(
         by_bus[signal.bus].append(signal)
     with opened(recording) as source:
         keyframe = _keyframe(source, start_ns)
-        of_modbus = {bus for bus, _ in source.servers}
+        of_telegrams = {bus for bus, kind in source.kinds.items() if kind is not Bus.CANOPEN}
         followers = {
-            bus: _follower(bus, found, descriptions, keyframe) for bus, found in by_bus.items() if bus not in of_modbus
+            bus: _follower(bus, found, descriptions, keyframe)
+            for bus, found in by_bus.items()
+            if bus not in of_telegrams
         }
         span = Span(None if keyframe is None else keyframe.t_ns + 1, end_ns)
 
@@ -67,8 +69,8 @@ def samples(
         for block in can_blocks(source, followers.keys(), span, workers, prepare) if followers else ():
             followers[block.bus].take(block)
         found = {bus: follower.found for bus, follower in followers.items()}
-        for bus in by_bus.keys() & of_modbus:
-            decoder = decoder_of(bus, servers={node: at for (name, node), at in source.servers.items() if name == bus})
+        for bus in by_bus.keys() & of_telegrams:
+            decoder = _telegram_decoder(source, bus, descriptions)
             _go_on(decoder, keyframe)
             found[bus] = telegram_values(source, decoder, _places(by_bus[bus]), span)
     return {
@@ -77,6 +79,16 @@ def samples(
         )
         for signal in signals
     }
+
+
+def _telegram_decoder(source: Recording, bus: str, descriptions: Mapping[tuple[str, int], Description]) -> BusDecoder:
+    kind = source.kinds[bus]
+    servers = {node: at for (name, node), at in source.servers.items() if name == bus}
+    if kind is Bus.MODBUS_TCP:
+        return decoder_of(bus, servers=servers)
+    described = {node: one for (name, node), one in descriptions.items() if name == bus}
+    orders = {node: order for (name, node), order in source.orders.items() if name == bus}
+    return decoder_of(bus, described, None, kind, orders)
 
 
 def _data_type(description: Description | None, address: Address) -> DataType | None:

@@ -13,6 +13,7 @@ from typing import Any, Final, NamedTuple
 
 from app.errors import RecordingError, UsageError
 from app.model.address import Address
+from app.model.description import Bus
 from app.model.description_file import BUILTIN, load_builtin
 from app.model.od_export import to_json
 from app.recording.cdr import NS, ClockReading
@@ -161,14 +162,20 @@ class _Copy:
 
     def _new_info(self) -> RecordingInfo:
         nodes = {}
-        others = {bus for bus, _ in self._recording.servers}
+        others = self._others
         for key, text in self._info.nodes.items():
             if key.rpartition("/")[0] in others:
                 continue
             slug, _, description = text.rpartition(" ")
             nodes[key] = f"{self._names.slug(slug)} {description if description in BUILTIN else 'unknown'}"
         versions = {name: version for name, version in self._info.versions.items() if name in ("hubside", *BUILTIN)}
-        return RecordingInfo(TURBINE, PERSON, self._info.bit_rates, nodes, versions)
+        rates = {bus: rate for bus, rate in self._info.bit_rates.items() if bus not in others}
+        return RecordingInfo(TURBINE, PERSON, rates, nodes, versions)
+
+    @property
+    def _others(self) -> set[str]:
+        """Buses whose telegrams are left out."""
+        return {bus for bus, kind in self._recording.kinds.items() if kind is not Bus.CANOPEN}
 
     def _attachments(self) -> list[AttachedFile]:
         ours = {f"descriptions/{name}.json": name for name in BUILTIN}
@@ -205,7 +212,7 @@ class _Copy:
         if found is None:
             return []
         t_ns, state = found
-        state = without(state, {bus for bus, _ in self._recording.servers})
+        state = without(state, self._others)
         for bus, kept in state["decoders"].items():
             self._hider.decoder(bus).restore(kept)
         hidden = self._hidden_state(state)

@@ -146,7 +146,7 @@ class _Cut:
     def _first_state(self) -> Iterator[Body]:
         """What all frames before the beginning have told, as a keyframe."""
         recording, before_ns = self._recording, self._start_ns - 1
-        course = Course((), recording.descriptions, _MAX_EVENTS, recording.servers)
+        course = Course((), recording.descriptions, _MAX_EVENTS, recording.servers, recording.kinds, recording.orders)
         keyframe = state_before(recording, before_ns)
         from_ns = -1 if keyframe is None else keyframe.t_ns
         if keyframe is not None:

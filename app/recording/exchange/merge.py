@@ -203,9 +203,12 @@ def _info(sources: Sequence[_Source]) -> RecordingInfo:
     rates: dict[str, int] = {}
     nodes: dict[str, str] = {}
     servers: dict[str, str] = {}
+    orders: dict[str, str] = {}
+    protocols: dict[str, str] = {}
     for source, info in zip(sources, infos, strict=True):
         rates |= {source.bus(bus): rate for bus, rate in info.bit_rates.items()}
-        for table, told in ((nodes, info.nodes), (servers, info.servers)):
+        protocols |= {source.bus(bus): name for bus, name in info.protocols.items()}
+        for table, told in ((nodes, info.nodes), (servers, info.servers), (orders, info.orders)):
             for key, what in told.items():
                 bus, _, number = key.rpartition("/")
                 key = f"{source.bus(bus)}/{number}"
@@ -213,8 +216,9 @@ def _info(sources: Sequence[_Source]) -> RecordingInfo:
                     raise UsageError(reason=f"{key} is {table[key]} in one file and {what} in another: rename a bus")
     versions = {name: version for info in infos for name, version in info.versions.items()}
     return RecordingInfo(
-        _joined(info.turbine for info in infos), _joined(info.who for info in infos), rates, nodes, versions, servers
-    )
+        _joined(info.turbine for info in infos), _joined(info.who for info in infos), rates, nodes, versions, servers,
+        protocols, orders,
+    )  # fmt: skip
 
 
 def _joined(names: Iterable[str]) -> str:

@@ -18,7 +18,7 @@ from app.recording.content import METADATA_ORIGIN, AttachedFile, Event, Recordin
 from app.recording.exchange.draft import Draft
 from app.recording.index.course import Course, Mark, Step, steps
 from app.recording.mcap_file import sync_directory
-from app.recording.node_table import described, read_servers
+from app.recording.node_table import described, read_orders, read_protocols, read_servers
 from app.recording.part import Batch, Identity, Part, event_entry
 from app.wire.frame import Frame
 
@@ -66,7 +66,15 @@ class Tape:
         self, subject: Subject, path_of: Callable[[int], Path], rotate: bool, course: type[Course] = Course
     ) -> None:
         self._subject, self._path_of, self._rotate = subject, path_of, rotate
-        self._course = course((), described(subject.info.nodes), _MAX_EVENTS, read_servers(subject.info.servers))
+        info = subject.info
+        self._course = course(
+            (),
+            described(info.nodes),
+            _MAX_EVENTS,
+            read_servers(info.servers),
+            read_protocols(info.protocols),
+            read_orders(info.orders),
+        )
         self._events, self._clocks = deque(subject.events), deque(subject.clocks)
         self._batch = Batch()
         self._part: Part | None = None

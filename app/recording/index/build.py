@@ -27,7 +27,7 @@ from app.recording.index.place import fingerprint, in_cache, index_path
 from app.recording.index.telegrams import telegram_traffic
 from app.recording.index.tracks import Tracks, pack_history
 from app.recording.index.traffic import BusTraffic, LoadPage
-from app.recording.node_table import server_table
+from app.recording.node_table import order_table, server_table
 from app.recording.reader import Recording, open_recording
 from app.recording.schemas import FIXED_TOPICS
 from app.wire.events import Event
@@ -107,7 +107,9 @@ class _Builder:
         self._span_ns = recording.span_ns or (0, 0)
         self._buses = [topic[1:] for topic in recording.topics if topic not in FIXED_TOPICS]
         self._noted = list(recording.events())
-        self._course = Course(self._buses, descriptions, _MAX_EVENTS, recording.servers)
+        self._course = Course(
+            self._buses, descriptions, _MAX_EVENTS, recording.servers, recording.kinds, recording.orders
+        )
         self._finder = SignFinder(descriptions)
         self._watched = {key: self._finder.watched(*key) for key in descriptions}
         self._unwatched: dict[tuple[str, int], ValueSeen] = {}
@@ -151,6 +153,8 @@ class _Builder:
         described = {f"{bus}/{node}": one.id for (bus, node), one in self._descriptions.items()}
         table["described"] = json.dumps(described)
         table["servers"] = json.dumps(server_table(self._recording.servers))
+        table["orders"] = json.dumps(order_table(self._recording.orders))
+        table["kinds"] = json.dumps({bus: kind.value for bus, kind in self._recording.kinds.items()})
         adus = dict.fromkeys({bus for bus, _ in self._recording.servers}, str(ETHERNET_BPS))
         return table | {f"bit_rate/{bus}": rates.get(bus, adus.get(bus, "0")) for bus in self._traffic}
 

@@ -13,10 +13,10 @@ from operator import attrgetter
 from typing import Any, Final, NamedTuple, TypeVar
 
 from app.errors import HubsideError
-from app.model.description import Description
+from app.model.description import Bus, Description
 from app.recording.content import Event, EventKind, Keyframe
 from app.recording.index.content import Gap
-from app.recording.node_table import ServerTable
+from app.recording.node_table import OrderTable, ServerTable
 from app.wire.decoders import decoder_of, decoder_of_frame, decoder_of_state
 from app.wire.frame import Frame
 from app.wire.live import LiveState
@@ -69,13 +69,16 @@ class Course:
         descriptions: Descriptions,
         max_events: int = 2000,
         servers: ServerTable | None = None,
+        kinds: Mapping[str, Bus] | None = None,
+        orders: OrderTable | None = None,
     ) -> None:
-        at = servers or {}
+        """``kinds`` is what is spoken on buses of which no device is described."""
+        at, spoken = servers or {}, kinds or {}
         self.live = LiveState(max_events)
         self.heard_ns = 0
         """Time of the last frame."""
         self.decoders = {
-            bus: decoder_of(bus, _on(bus, descriptions), _on(bus, at) or None)
+            bus: decoder_of(bus, _on(bus, descriptions), _on(bus, at) or None, spoken.get(bus), _on(bus, orders or {}))
             for bus in sorted({*buses, *(bus for bus, _ in descriptions), *(bus for bus, _ in at)})
         }
         for (bus, node), description in descriptions.items():

@@ -66,8 +66,12 @@ def course_at(index: RecordingIndex, recording: Recording, descriptions: Descrip
     return course
 
 
+def _course(index: RecordingIndex, descriptions: Descriptions) -> Course:
+    return Course((), descriptions, servers=index.servers, kinds=index.kinds, orders=index.orders)
+
+
 def _restored(index: RecordingIndex, descriptions: Descriptions, t_ns: int) -> tuple[Course, int]:
-    course, keyframe = Course((), descriptions, servers=index.servers), index.keyframe(t_ns)
+    course, keyframe = _course(index, descriptions), index.keyframe(t_ns)
     if keyframe is None:
         return course, index.span_ns[0] - 1
     course.restore(keyframe.state)

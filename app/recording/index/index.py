@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sqlite3
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from threading import Lock
@@ -14,6 +14,7 @@ import numpy as np
 import zstandard
 
 from app.errors import RecordingError
+from app.model.description import Bus
 from app.recording.content import Event as Noted
 from app.recording.content import Keyframe
 from app.recording.index.arrays import unpack_arrays
@@ -29,7 +30,14 @@ from app.recording.index.place import SCHEMA, fingerprint, in_cache, index_path
 from app.recording.index.series import SeriesReader
 from app.recording.index.tracks import unpack_history
 from app.recording.index.traffic import LOAD_PAGE_SHIFT, load_of
-from app.recording.node_table import ServerTable, described, read_servers
+from app.recording.node_table import (
+    OrderTable,
+    ServerTable,
+    described,
+    read_orders,
+    read_protocols,
+    read_servers,
+)
 from app.recording.reader import Recording
 from app.wire.events import Event
 from app.wire.signs import Sign
@@ -83,6 +91,16 @@ class RecordingIndex:
     def servers(self) -> ServerTable:
         """Where the nodes of Modbus TCP buses listened, by bus and node."""
         return read_servers(json.loads(self._meta.get("servers", "{}")))
+
+    @property
+    def orders(self) -> OrderTable:
+        """What a site says of the process data of nodes on PROFIBUS, by bus and node."""
+        return read_orders(json.loads(self._meta.get("orders", "{}")))
+
+    @property
+    def kinds(self) -> Mapping[str, Bus]:
+        """What is spoken on each bus."""
+        return read_protocols(json.loads(self._meta.get("kinds", "{}")))
 
     def made_of(self) -> str:
         """Fingerprint of the recording that it was made of."""

@@ -10,8 +10,9 @@ import numpy as np
 
 from app.recording.index.content import Counts, Times
 from app.recording.reader import Recording
-from app.wire.frame import Adu, Can, Frame
+from app.wire.frame import Adu, Can, Fdl, Frame
 from app.wire.modbus.adu import wire_bits
+from app.wire.profibus import fdl
 
 
 class TelegramTraffic(NamedTuple):
@@ -46,4 +47,7 @@ def _traffic(frames: Iterable[Frame]) -> Iterator[TelegramTraffic]:
 
 
 def _bits(frame: Frame) -> int:
-    return wire_bits(len(frame.payload.data)) if isinstance(frame.payload, Adu) else 0
+    payload = frame.payload
+    if isinstance(payload, Adu):
+        return wire_bits(len(payload.data))
+    return fdl.wire_bits(len(payload.data)) if isinstance(payload, Fdl) else 0

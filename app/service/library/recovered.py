@@ -8,7 +8,7 @@ hold another value since, as after a boot-up without a save.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from pathlib import Path
@@ -19,21 +19,25 @@ from app.errors import RecordingError
 from app.model.address import Address
 from app.model.checks import RESTORE_DEFAULTS, STORE_PARAMETERS
 from app.model.datatypes import Raw
-from app.model.description import Description
+from app.model.description import Bus, Description
 from app.model.sets import Origin, ParameterSet, identity_of, iso_time
 from app.recording.content import Event, EventKind, RecordingInfo
 from app.recording.node_table import read_nodes, read_servers
 from app.service.devices import decode
 from app.service.library.series import Progress, Series
-from app.wire.decoders import BusDecoder, decoder_of
-from app.wire.frame import Adu, Can, Direction
+from app.wire.decoders import BusDecoder, decoder_of, decoder_of_frame
+from app.wire.frame import Direction, Fdl, Frame
 from app.wire.records import (
     BootUpSeen,
     Outcome,
+    Protocol,
     Record,
     RestartSeen,
+    SaveSeen,
     SdoAccess,
     SdoSeen,
+    SlaveSeen,
+    SlaveState,
     Source,
     TransactionSeen,
     ValueSeen,
@@ -131,13 +135,17 @@ class _Node:
                 self._forget(address)
                 self.empty.add(address)
             elif address not in self.values:
-                self.failed[address] = f"abort {record.abort_code or 0:08X}h"
+                self.failed[address] = _refusal(record)
 
     def told(self, record: ValueSeen, ours: bool) -> None:
         """One value out of a message that held many."""
         self._forget(record.address)
         self.values[record.address] = record.data
         self.seen[record.address] = Seen(record.t_ns, SdoAccess.READ, ours)
+
+    def ordered(self, address: Address) -> None:
+        """What was written there was an order to save."""
+        self._forget(address)
 
     def doubt(self, why: Doubt) -> None:
         """Whatever is known now is in doubt from here on."""
@@ -147,6 +155,11 @@ class _Node:
         for known in (self.values, self.seen, self.failed):
             known.pop(address, None)
         self.empty.discard(address)
+
+
+def _refusal(record: SdoSeen) -> str:
+    code = record.abort_code or 0
+    return f"PKW error {code}" if record.protocol is Protocol.PKW else f"abort {code:08X}h"
 
 
 def recover_sets(
@@ -164,7 +177,7 @@ def recover_sets(
     try:
         with Series(paths) as series:
             who = _nodes_of(series.infos, described, named or {})
-            nodes = _follow(series, on_progress)
+            nodes = _follow(series, _describing(who, named or {}), on_progress)
             sets, nameless = [], {}
             for (bus, number), node in sorted(nodes.items()):
                 name = who.get((bus, number)) or (named or {}).get(number)
@@ -189,7 +202,29 @@ def _nodes_of(
     return found
 
 
-def _follow(series: Series, on_progress: Progress | None) -> dict[tuple[str, int], _Node]:
+_Describing = Callable[[str], Mapping[int, Description]]
+
+
+def _describing(who: Mapping[tuple[str, int], Named], named: Mapping[int, Named]) -> _Describing:
+    """What stands on a bus."""
+
+    def on(bus: str) -> dict[int, Description]:
+        told = {node: one.description for (name, node), one in who.items() if name == bus}
+        return told | {node: one.description for node, one in named.items()}
+
+    return on
+
+
+def _decoder(frame: Frame, of_modbus: Mapping[str, Mapping[int, str]], described: _Describing) -> BusDecoder:
+    """That of the frame's bus. On PROFIBUS only who knows the device can tell parameters from other data."""
+    if isinstance(frame.payload, Fdl):
+        return decoder_of(frame.bus, described(frame.bus), kind=Bus.PROFIBUS_DP)
+    if frame.bus in of_modbus:
+        return decoder_of(frame.bus, servers=of_modbus[frame.bus])
+    return decoder_of_frame(frame)
+
+
+def _follow(series: Series, described: _Describing, on_progress: Progress | None) -> dict[tuple[str, int], _Node]:
     servers = {key: at for info in series.infos for key, at in read_servers(info.servers).items()}
     of_modbus = {bus: {node: at for (on, node), at in servers.items() if on == bus} for bus, _ in servers}
     decoders: dict[str, BusDecoder] = {}
@@ -198,11 +233,9 @@ def _follow(series: Series, on_progress: Progress | None) -> dict[tuple[str, int
     for frame in series.frames(on_progress):
         while gaps and gaps[0].t_ns <= frame.t_ns:
             _gap(decoders, nodes, gaps.popleft())
-        if not isinstance(frame.payload, Can | Adu):
-            continue
         decoder = decoders.get(frame.bus)
         if decoder is None:
-            decoder = decoders[frame.bus] = decoder_of(frame.bus, servers=of_modbus.get(frame.bus))
+            decoder = decoders[frame.bus] = _decoder(frame, of_modbus, described)
         records = decoder.feed(frame)
         for record in records:
             _take(nodes, record)
@@ -226,8 +259,19 @@ def _gap(decoders: Mapping[str, BusDecoder], nodes: dict[tuple[str, int], _Node]
 def _take(nodes: dict[tuple[str, int], _Node], record: Record) -> None:
     if isinstance(record, SdoSeen):
         nodes.setdefault((record.bus, record.node), _Node()).take(record)
-    elif isinstance(record, BootUpSeen | RestartSeen) and (record.bus, record.node) in nodes:
-        nodes[record.bus, record.node].doubt(Doubt.BOOT_UP)
+        return
+    node = nodes.get((record.bus, record.node))
+    if node is None:
+        return
+    if isinstance(record, SaveSeen):
+        node.ordered(record.address)
+    elif isinstance(record, BootUpSeen | RestartSeen) or _is_away(record):
+        node.doubt(Doubt.BOOT_UP)
+
+
+def _is_away(record: Record) -> bool:
+    """A slave does not tell that it starts anew; one that was away may have done so."""
+    return isinstance(record, SlaveSeen) and record.state is SlaveState.ABSENT
 
 
 def _take_dictionary(nodes: dict[tuple[str, int], _Node], records: Sequence[Record]) -> None:

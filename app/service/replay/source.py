@@ -11,6 +11,7 @@ from threading import Lock
 from typing import Final
 
 from app.errors import RecordingError
+from app.model.description import Bus
 from app.model.servers import MODBUS
 from app.model.site import BusConfig, Device, Station, Turbine
 from app.recording.content import Event, Keyframe
@@ -26,6 +27,8 @@ WINDOW_NS: Final = 16_000_000_000
 KEYFRAME_EVERY_NS: Final = 6_000_000_000
 """A recording of ours has a keyframe at least as often."""
 _USUAL_BITRATE: Final = 500_000
+_PROFIBUS: Final = "profibus:"
+"""The connection of a PROFIBUS line; of a recording no port is known."""
 _LOOK_BACK: Final = (KEYFRAME_EVERY_NS, 60_000_000_000, None)
 
 
@@ -53,6 +56,8 @@ class Source:
             self._near = NearFrames(self._recording)
             self.turbine = turbine_of(self._recording, known)
             self.descriptions = self._recording.descriptions
+            self.kinds = self._recording.kinds
+            self.orders = self._recording.orders
             self.events = tuple(self._recording.events())
             first = next(self._recording.keyframes(), None)
             self._recording.keep()
@@ -132,14 +137,16 @@ def turbine_of(recording: Recording, known: Mapping[str, Turbine]) -> Turbine:
         at = info.servers.get(f"{bus}/{node}", "")
         stations.setdefault(slug.rpartition("/")[0], []).append(Device(slug, name, description_id, bus, node, at))
     buses = [topic[1:] for topic in recording.topics if topic not in FIXED_TOPICS]
-    of_modbus = {bus for bus, _ in recording.servers}
-    configs = tuple(
-        BusConfig(bus, MODBUS, 0) if bus in of_modbus else BusConfig(bus, "", info.bit_rates.get(bus, _USUAL_BITRATE))
-        for bus in buses
-    )
+    configs = tuple(_config(bus, recording.kinds.get(bus), info.bit_rates.get(bus, _USUAL_BITRATE)) for bus in buses)
     slug = info.turbine or recording.path.stem
     name = slug.upper() if named is None else named.name
     return Turbine(slug, name, configs, tuple(_station(one, devices, named) for one, devices in stations.items()))
+
+
+def _config(bus: str, kind: Bus | None, bitrate: int) -> BusConfig:
+    if kind is Bus.MODBUS_TCP:
+        return BusConfig(bus, MODBUS, 0)
+    return BusConfig(bus, _PROFIBUS if kind is Bus.PROFIBUS_DP else "", bitrate)
 
 
 def _station(slug: str, devices: list[Device], named: Turbine | None) -> Station:

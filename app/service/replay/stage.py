@@ -48,7 +48,7 @@ class ReplayStage:
             for device in source.turbine.devices
             if (device.bus, device.node) in source.descriptions
         )
-        self.buses = {bus.name: self._feed(bus.name, bus.bitrate) for bus in source.turbine.buses}
+        self.buses = {bus.name: self._feed(source, bus.name, bus.bitrate) for bus in source.turbine.buses}
         if keyframe is not None:
             self._restore(keyframe.state, source)
         self._heard_ns = self.live.t_ns if keyframe is None else keyframe.state.get("heard_ns", self.live.t_ns)
@@ -108,10 +108,11 @@ class ReplayStage:
             if feed is not None:
                 feed.take(list(of_bus))
 
-    def _feed(self, name: str, bitrate: int) -> BusFeed:
+    def _feed(self, source: Source, name: str, bitrate: int) -> BusFeed:
         described = {target.node: target.description for target in self.targets if target.device.bus == name}
         servers = {node: server.text for node, server in self.turbine.servers(name).items()} or None
-        feed = BusFeed(name, bitrate, described, self.live, self._lock, servers)
+        orders = {node: order for (bus, node), order in source.orders.items() if bus == name}
+        feed = BusFeed(name, bitrate, described, self.live, self._lock, servers, source.kinds.get(name), orders)
         for node, description in described.items():
             feed.describe(node, description)
         return feed

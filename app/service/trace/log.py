@@ -14,9 +14,12 @@ from app.model.description import Description
 from app.wire.decoder import CanOpenDecoder
 from app.wire.decoders import BusDecoder
 from app.wire.frame import Frame
+from app.wire.profibus.decoder import ProfibusDecoder
+from app.wire.profibus.pzd import Order
 from app.wire.records import EmcySeen, Outcome, Record, SdoAccess, SdoSeen
 from app.wire.trace.ids import Identifiers, IdentifierView
 from app.wire.trace.modbus_tracer import ModbusTracer
+from app.wire.trace.profibus_tracer import ProfibusTracer
 from app.wire.trace.ring import Chunk, FrameRing
 from app.wire.trace.service import UNKNOWN, Speaker
 from app.wire.trace.tracer import Gap, Item, Tracer, Tracing
@@ -28,17 +31,25 @@ MAX_EMERGENCIES: Final = 2000
 class BusTrace:
     """The trace of the bus ``bus``, which ``decoder`` follows; ``lock`` is held by the receive thread.
 
-    ``servers``: ``host:port`` by node, where it is a Modbus TCP bus. ``epoch`` is raised when a node turns out to be
-    another device: then tracers must be made anew.
+    ``servers``: ``host:port`` by node, where it is a Modbus TCP bus; ``orders`` of process data by node, where it is
+    PROFIBUS. ``epoch`` is raised when a node turns out to be another device: then tracers must be made anew.
     """
 
-    def __init__(self, bus: str, decoder: BusDecoder, lock: Lock, servers: Mapping[int, str] | None = None) -> None:
+    def __init__(
+        self,
+        bus: str,
+        decoder: BusDecoder,
+        lock: Lock,
+        servers: Mapping[int, str] | None = None,
+        orders: Mapping[int, Order] | None = None,
+    ) -> None:
         self.bus = bus
         self.epoch = 0
         self.sdo_count: dict[int, int] = {}
         """Transfers by node since the connection was opened."""
         self._decoder = decoder
         self._servers = servers
+        self._orders = orders
         self._lock = lock
         self._descriptions: dict[int, Description] = {}
         self._identifiers = Identifiers()
@@ -90,6 +101,8 @@ class BusTrace:
         """One that begins anywhere: give it the snapshot of a chunk by ``restart``."""
         if self._servers is not None:
             return ModbusTracer(self.bus, self._servers)
+        if isinstance(self._decoder, ProfibusDecoder):
+            return ProfibusTracer(self.bus, self.descriptions(), self._orders)
         return Tracer(self.bus, self.descriptions())
 
     def tracer_now(self) -> tuple[Tracing, int]:

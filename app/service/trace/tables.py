@@ -257,7 +257,7 @@ def _transfer(seen: SdoSeen, namer: Namer) -> SdoLine:
         protocol=seen.protocol.value,
         outcome=seen.outcome.value,
         item=namer.item(seen.bus, seen.node, seen.address, seen.data),
-        abort=None if seen.abort_code is None else abort_details(seen.abort_code),
+        abort=None if seen.abort_code is None else abort_details(seen.abort_code, seen.protocol),
         aborted_by=None if seen.aborted_by is None else seen.aborted_by.value,
         took_ms=round(seen.dt_ns / 1e6, 2),
     )

@@ -10,11 +10,14 @@ from app.model.address import Address
 from app.model.description import Description, Entry, Kind
 from app.model.values import quantity_of, show
 from app.service.devices import Target, decode
+from app.service.trace.fdl_text import fdl_notes
 from app.wire.emcy import NO_ERROR, emcy_text_key
 from app.wire.events import tell_fault
-from app.wire.frame import Adu, Can, Frame
+from app.wire.frame import Adu, Can, Fdl, Frame
 from app.wire.modbus.functions import exception_text_key
 from app.wire.modbus.transactions import ARROW
+from app.wire.profibus.pkw import error_text_key
+from app.wire.profibus.telegrams import Signal
 from app.wire.records import (
     BootUpSeen,
     EmcySeen,
@@ -26,8 +29,10 @@ from app.wire.records import (
     NmtCommandSeen,
     OrphanSeen,
     Outcome,
+    Protocol,
     RestartSeen,
     SdoSeen,
+    SlaveSeen,
     Source,
     StateSeen,
     SyncSeen,
@@ -35,6 +40,7 @@ from app.wire.records import (
     ValueSeen,
 )
 from app.wire.sdo import abort_text_key
+from app.wire.trace.fdl_told import FdlTold
 from app.wire.trace.service import Service
 from app.wire.trace.tracer import Step, TraceRow, direction_of
 
@@ -77,7 +83,8 @@ class TraceLine:
     """One frame, or a gap in the traffic. ``start_t_ns``: the first request of the transfer that this frame ended.
 
     Of Modbus TCP ``transaction`` is set, ``peer`` is the client's end of the connection, ``number`` the function
-    code and ``dlc`` the bytes of the ADU; ``can_id`` is 0.
+    code and ``dlc`` the bytes of the ADU; ``can_id`` is 0. Of PROFIBUS ``fdl`` is set, and ``dlc`` is the bytes of the
+    telegram.
     """
 
     t_ns: int
@@ -100,6 +107,22 @@ class TraceLine:
     start_t_ns: int | None
     transaction: int | None
     peer: str | None
+    fdl: TraceFdl | None
+
+
+@dataclass(frozen=True, slots=True)
+class TraceFdl:
+    """Of a PROFIBUS telegram: who speaks to whom, and the access points; None where it does not say.
+
+    ``pkw``: its data begin with PKW, the process data follow. ``sound``: it is a whole telegram without an error.
+    """
+
+    source: int | None
+    destination: int | None
+    dsap: int | None
+    ssap: int | None
+    pkw: bool
+    sound: bool
 
 
 class Namer:
@@ -158,8 +181,10 @@ def _named(description: Description, entry: Entry, raw: int | float | str) -> tu
 def line(row: TraceRow, namer: Namer) -> TraceLine:
     """A row for the page."""
     item, speaker = row.item, row.speaker
-    can = item.payload if isinstance(item, Frame) and isinstance(item.payload, Can) else Can(0)
-    adu = item.payload if isinstance(item, Frame) and isinstance(item.payload, Adu) else None
+    payload = item.payload if isinstance(item, Frame) else None
+    can = payload if isinstance(payload, Can) else Can(0)
+    adu = payload if isinstance(payload, Adu) else None
+    telegram = payload if isinstance(payload, Adu | Fdl) else None
     took_ns = row.took_ns
     return TraceLine(
         t_ns=item.t_ns,
@@ -168,8 +193,8 @@ def line(row: TraceRow, namer: Namer) -> TraceLine:
         can_id=can.can_id,
         extended=can.extended,
         remote=can.remote,
-        dlc=can.length if adu is None else len(adu.data),
-        data=(can if adu is None else adu).data.hex(),
+        dlc=can.length if telegram is None else len(telegram.data),
+        data=(can if telegram is None else telegram).data.hex(),
         t_adapter_ns=item.t_adapter_ns if isinstance(item, Frame) else None,
         service=speaker.service.value,
         number=speaker.number,
@@ -182,7 +207,14 @@ def line(row: TraceRow, namer: Namer) -> TraceLine:
         start_t_ns=None if took_ns is None else item.t_ns - took_ns,
         transaction=None if adu is None else int.from_bytes(adu.data[:2], "big"),
         peer=None if adu is None else _peer(adu, speaker.service),
+        fdl=_fdl(row.fdl) if isinstance(payload, Fdl) else None,
     )
+
+
+def _fdl(told: FdlTold | None) -> TraceFdl:
+    if told is None:
+        return TraceFdl(None, None, None, None, pkw=False, sound=False)
+    return TraceFdl(told.source, told.destination, told.dsap, told.ssap, told.has_pkw, sound=True)
 
 
 def _peer(adu: Adu, service: Service) -> str:
@@ -198,11 +230,23 @@ def items_of(row: TraceRow, namer: Namer) -> Iterable[TraceItem]:
     bus, node = row.item.bus, row.speaker.node
     if row.address is not None:
         yield namer.item(bus, node, row.address, row.value)
-    elif row.speaker.service in _CARRYING:
+    if row.fdl is not None:
+        yield from (_signal(bus, node, signal, value, namer) for signal, value in row.fdl.signals)
+    elif row.address is None and row.speaker.service in _CARRYING:
         values = [record for record in row.records if isinstance(record, ValueSeen) and record.node == node]
         # Of an exchange both ways what the device gave comes first: what was written is known from before.
         for record in sorted(values, key=lambda one: one.source is Source.PDO_RX):
             yield namer.item(bus, node, record.address, record.data)
+
+
+def _signal(bus: str, node: int, signal: Signal, value: int, namer: Namer) -> TraceItem:
+    """A signal of process data as its parameter; one that no parameter has is told by its number."""
+    description = namer.description(bus, node)
+    entry = None if description is None or signal.address is None else description.entries.get(signal.address)
+    if entry is not None and entry.type.size is not None:
+        data = value.to_bytes(entry.type.size, "little", signed=signal.signed)
+        return namer.item(bus, node, entry.address, data)
+    return TraceItem(f"PZD {signal.number}", signal.name, None, str(value), "", None, ())
 
 
 def notes_of(row: TraceRow, namer: Namer) -> Iterable[TraceNote]:
@@ -216,6 +260,8 @@ def notes_of(row: TraceRow, namer: Namer) -> Iterable[TraceNote]:
     for key, span in (("read", row.read), ("written", row.written)):
         if span is not None:
             yield TraceNote(f"trace.note.registers_{key}", {"first": span[0], "last": sum(span) - 1})
+    if row.fdl is not None:
+        yield from (TraceNote(note.key, note.details) for note in fdl_notes(row.fdl, service is Service.FDL_SAME))
     for record in row.records:
         note = _NOTES.get(type(record))
         if note is not None:
@@ -226,8 +272,10 @@ def notes_of(row: TraceRow, namer: Namer) -> Iterable[TraceNote]:
         yield TraceNote("trace.note.error_frame", {})
 
 
-def abort_details(code: int) -> dict[str, Any]:
-    """An abort code in hexadecimal and in words."""
+def abort_details(code: int, protocol: Protocol = Protocol.EXPEDITED) -> dict[str, Any]:
+    """An abort code in hexadecimal and in words; of PKW an error code, as its manual counts them."""
+    if protocol is Protocol.PKW:
+        return {"code_hex": str(code), "reason_key": error_text_key(code)}
     return {"code_hex": f"{code:08X}h", "reason_key": abort_text_key(code)}
 
 
@@ -300,6 +348,10 @@ def _sdo(seen: SdoSeen, row: TraceRow, _namer: Namer) -> _Notes:
         yield TraceNote("trace.note.took", {"ms": f"{seen.dt_ns / 1e6:.1f}"})
 
 
+def _slave(seen: SlaveSeen, _row: TraceRow, _namer: Namer) -> _Notes:
+    yield TraceNote("trace.fdl.slave", {"node": seen.node, "state_key": seen.state.text_key})
+
+
 def _transaction(seen: TransactionSeen, _row: TraceRow, _namer: Namer) -> _Notes:
     if seen.outcome is Outcome.DONE:
         yield TraceNote("trace.note.took", {"ms": f"{seen.dt_ns / 1e6:.1f}"})
@@ -334,6 +386,7 @@ _NOTES: Final[Mapping[type, Callable[[Any, TraceRow, Namer], _Notes]]] = {
     RestartSeen: _restart,
     FaultSeen: _fault,
     SdoSeen: _sdo,
+    SlaveSeen: _slave,
     TransactionSeen: _transaction,
 }
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 from app.model.address import Address
-from app.wire.modbus.faults import FaultWatch
+from app.wire.fault_watch import FaultWatch
 from app.wire.modbus.image import (
     RX_MAPPING,
     RX_REGISTER,

@@ -47,20 +47,37 @@ class ProfibusDecoder:
     PROTOCOL: Final = "profibus-dp"
     """Names the protocol in a kept state."""
 
-    def __init__(self, bus: str, descriptions: Mapping[int, Description] | None = None) -> None:
+    def __init__(
+        self,
+        bus: str,
+        descriptions: Mapping[int, Description] | None = None,
+        orders: Mapping[int, Order] | None = None,
+    ) -> None:
+        """``orders`` are what a site says of the process data of its stations; the line proves them, or not."""
         self.bus = bus
         self._slaves: dict[int, Slave] = {}
         self._open: _Open | None = None
         for node, description in (descriptions or {}).items():
             self.set_description(node, description)
+        for node, order in (orders or {}).items():
+            self._slave(node).proof.setting = order
 
     def set_description(self, node: int, description: Description | None) -> None:
         """Tell what stands at ``node``: without it exchanged data tell nothing."""
         self._slave(node).description = description
 
     def set_order(self, node: int, order: Order | None) -> None:
-        """The order of bytes of the process data of ``node``; None while it is not proven."""
-        self._slave(node).order = order
+        """Somebody has proven the order of the process data of ``node``; None: nothing is proven any more."""
+        self._slave(node).proof.know(order)
+
+    def slave(self, node: int) -> Slave | None:
+        """All that is known of ``node``; None where it was never seen, nor described."""
+        return self._slaves.get(node)
+
+    @property
+    def asked(self) -> Telegram | None:
+        """The request that waits for its answer: the line has one at a time."""
+        return None if self._open is None else self._open.telegram
 
     def state(self, node: int) -> SlaveState | None:
         """The state in which ``node`` was seen, None where it was not."""
@@ -172,7 +189,8 @@ class ProfibusDecoder:
             slave = slaves[int(number)] = Slave(self.bus, int(number))
             slave.restore(kept)
         for node, known in self._slaves.items():
-            slaves.setdefault(node, Slave(self.bus, node)).description = known.description
+            slave = slaves.setdefault(node, Slave(self.bus, node))
+            slave.description, slave.proof.setting = known.description, known.proof.setting
         asked = None
         if state["open"] is not None:
             data, client = state["open"]

@@ -39,6 +39,16 @@ class Status(IntFlag):
     """Told by a master."""
     OVERFLOW = 1 << 23
 
+    @property
+    def text_keys(self) -> list[str]:
+        """Text keys of what it tells; a bit that every slave sets tells nothing."""
+        return [f"profibus.status.{str(bit.name).lower()}" for bit in Status if self & bit and bit is not Status.ALWAYS]
+
+    @property
+    def faults(self) -> Status:
+        """What of it keeps the slave from exchanging data, or is not as it should be."""
+        return self & ~(Status.ALWAYS | Status.WATCHDOG | Status.FREEZE | Status.SYNC)
+
 
 class DeviceBlock(NamedTuple):
     """Diagnosis of the maker's own making."""

@@ -29,6 +29,8 @@ MIN_LE: Final = HEAD + 1
 MAX_LE: Final = 249
 MAX_DATA: Final = MAX_LE - HEAD
 MAX_TELEGRAM: Final = MAX_LE + 6
+BITS_PER_BYTE: Final = 11
+"""Start, eight of data, parity, stop."""
 _SIZES: Final = {SD1: 6, SD3: 14, SD4: 3, SC: 1}
 _EXTENDED: Final = 0x80
 _NO_SAP: Final = 0xC0
@@ -99,6 +101,11 @@ class Telegram(NamedTuple):
 
 
 AnyTelegram = Telegram | Token | ShortAck
+
+
+def wire_bits(size: int) -> int:
+    """Bits that ``size`` bytes of telegrams take on the line; the pauses between telegrams are not in it."""
+    return size * BITS_PER_BYTE
 
 
 def check_sum(data: bytes) -> int:

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 
 from app.model.description import Bus, Description
+from app.wire.fault_watch import DSP408, FaultWatch
 from app.wire.frame import Direction
 from app.wire.profibus import pkw
+from app.wire.profibus.order_proof import OrderProof
 from app.wire.profibus.pkw import AskKind, ReplyKind
 from app.wire.profibus.pkw_follower import Ended, PkwFollower
-from app.wire.profibus.pzd import First, Order, decode_pzd
-from app.wire.profibus.telegrams import TelegramType, Words, telegram_of
+from app.wire.profibus.pzd import Order, decode_pzd
+from app.wire.profibus.telegrams import Signal, TelegramType, Words, telegram_of
 from app.wire.records import (
+    FaultSeen,
     Outcome,
     Protocol,
     Record,
@@ -38,10 +41,26 @@ class Slave:
         self.node = node
         self.state: SlaveState | None = None
         self.description: Description | None = None
-        self.order: Order | None = None
-        """That of its process data; None while nobody has proven it, and then they tell nothing."""
+        self.proof = OrderProof()
+        """Of its process data, which tell nothing while their order is not proven."""
+        self.outputs = b""
+        """What it was sent in its latest exchange; empty where there was none."""
+        self.inputs = b""
+        """What it answered then."""
         self._missed = 0
         self._pkw = PkwFollower()
+        self._faults = FaultWatch(DSP408)
+
+    @property
+    def order(self) -> Order | None:
+        """That of its process data; None while it is not proven."""
+        return self.proof.order
+
+    @property
+    def telegram(self) -> TelegramType | None:
+        """The type that it exchanges; None where it is not told."""
+        described = self.description is not None and self.description.bus is Bus.PROFIBUS_DP
+        return telegram_of(len(self.outputs), len(self.inputs)) if described else None
 
     def answered(self, t_ns: int, state: SlaveState | None) -> list[Record]:
         """It said something, which shows it in ``state`` (None: whatever it was, it is there)."""
@@ -59,17 +78,38 @@ class Slave:
 
     def exchanged(self, t_ns: int, outputs: bytes, inputs: bytes, client: Direction, base: int) -> list[Record]:
         """One Data_Exchange, with the inputs at ``base`` of their telegram. Raises FormatError on no PKW."""
-        telegram = telegram_of(len(outputs), len(inputs))
-        if telegram is None or self.description is None or self.description.bus is not Bus.PROFIBUS_DP:
+        self.outputs, self.inputs = outputs, inputs
+        telegram = self.telegram
+        if telegram is None:
             return []
+        if not telegram.has_pkw:
+            told = self._process_data(t_ns, telegram, outputs, inputs)
+            return [*told, *self._faults_of(told)]
+        ends = self._pkw.exchange(t_ns, outputs[: pkw.SIZE], inputs[: pkw.SIZE], client, base)
+        for ended in ends:
+            self._prove(telegram, ended, inputs)
         records = self._process_data(t_ns, telegram, outputs, inputs)
-        if telegram.has_pkw:
-            for ended in self._pkw.exchange(t_ns, outputs[: pkw.SIZE], inputs[: pkw.SIZE], client, base):
-                records += self._told(t_ns, ended)
-        return records
+        for ended in ends:
+            records += self._told(t_ns, ended)
+        return [*records, *self._faults_of(records)]
+
+    def _faults_of(self, records: Sequence[Record]) -> Iterator[FaultSeen]:
+        """What the values that it gave tell of a fault, where that is new."""
+        for record in records:
+            if isinstance(record, ValueSeen) and record.source in (Source.SDO_READ, Source.PDO_TX):
+                fault = self._faults.see(record)
+                if fault is not None:
+                    yield fault
+
+    def _prove(self, telegram: TelegramType, ended: Ended, inputs: bytes) -> None:
+        """What was read stands in the process data of the same telegram too, where they have it."""
+        job, answer = ended.job, ended.answer
+        if job.request.kind is AskKind.READ and answer is not None and answer.data is not None:
+            self.proof.take(telegram, job.request.address, answer.data, inputs[pkw.SIZE :])
 
     def forget(self, t_ns: int) -> list[Record]:
         """It is gone, or frames are missing: what is open will not be answered."""
+        self._faults.forget()
         return [record for ended in self._pkw.forget() for record in self._told(t_ns, ended)]
 
     def _become(self, t_ns: int, state: SlaveState | None) -> list[Record]:
@@ -86,13 +126,23 @@ class Slave:
         ]
 
     def _values(self, t_ns: int, words: Words, data: bytes, source: Source) -> Iterator[Record]:
-        if self.order is None or self.description is None:
-            return
-        for signal, value in decode_pzd(words, data, self.order).items():
-            entry = None if signal.address is None else self.description.entries.get(signal.address)
+        for signal, value in self.signals(words, data).items():
+            known = None if self.description is None else self.description.entries
+            entry = None if signal.address is None or known is None else known.get(signal.address)
             if entry is not None and entry.type.size is not None:
                 raw = value.to_bytes(entry.type.size, "little", signed=signal.signed)
                 yield ValueSeen(t_ns, self.bus, self.node, entry.address, raw, source)
+
+    def signals(self, words: Words, data: bytes) -> dict[Signal, int]:
+        """Process data as numbers, as far as their order is proven. Raises FormatError on another length."""
+        if self.proof.order is not None:
+            return decode_pzd(words, data, self.proof.order)
+        found: dict[Signal, int] = {}
+        for signal in (signal for word in words for signal in word):
+            order = self.proof.tells(signal)
+            if order is not None:
+                found[signal] = decode_pzd(words, data, order)[signal]
+        return found
 
     def _told(self, t_ns: int, ended: Ended) -> Iterator[Record]:
         job, answer = ended.job, ended.answer
@@ -116,14 +166,21 @@ class Slave:
 
     def snapshot(self) -> dict[str, Any]:
         """JSON-able. The description is not in it."""
-        state = None if self.state is None else self.state.value
-        order = None if self.order is None else [self.order.byte.value, self.order.word.value]
-        return {"state": state, "order": order, "missed": self._missed, "pkw": self._pkw.snapshot()}
+        return {
+            "state": None if self.state is None else self.state.value,
+            "proof": self.proof.snapshot(),
+            "outputs": self.outputs.hex(),
+            "inputs": self.inputs.hex(),
+            "missed": self._missed,
+            "pkw": self._pkw.snapshot(),
+            "faults": self._faults.snapshot(),
+        }
 
     def restore(self, kept: Mapping[str, Any]) -> None:
         """Go on from ``snapshot()``. Raises KeyError or ValueError on another state."""
         self.state = None if kept["state"] is None else SlaveState(kept["state"])
-        order = kept["order"]
-        self.order = None if order is None else Order(First(order[0]), First(order[1]))
+        self.proof.restore(kept["proof"])
+        self.outputs, self.inputs = bytes.fromhex(kept["outputs"]), bytes.fromhex(kept["inputs"])
         self._missed = kept["missed"]
         self._pkw.restore(kept["pkw"])
+        self._faults.restore(kept["faults"])

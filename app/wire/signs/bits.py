@@ -48,6 +48,12 @@ _CIA402: Final = (
 TABLES: Final[dict[str, tuple[Test, ...]]] = {
     # Statusword, masks of CiA 402 (manual, table 49)
     "statusword": (*_CIA402, Test(SignKind.FOLLOWING_ERROR, _WARNING, _high(13))),
+    # States of DSP-408 in bits 0 to 3; ready (bit 3) is withdrawn in those of faults (ED2 manual, 4.8.3 and 5.7)
+    "ed2_statusword": (
+        Test(SignKind.AXIS_FAULT, _ERROR, lambda raw: raw & 0x0F in (0x1, 0x3, 0x7)),
+        Test(SignKind.AXIS_ENABLED, _INFO, lambda raw: raw & 0x0F == 0x0F),
+        Test(SignKind.AXIS_WARNING, _WARNING, _high(5)),
+    ),
     "pd4e_statusword": _CIA402,  # bit 13 is a following error in some modes only, and no other bit tells which
     "controlword": (Test(SignKind.EFC_COMMAND, _WARNING, _high(11)),),
     # Inputs of the axis; those of safety are at 24 V when all is well (manual, tables 71 and 72)

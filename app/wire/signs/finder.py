@@ -11,12 +11,14 @@ from app.model.values import show
 from app.wire import emcy, sdo
 from app.wire.events import Severity, tell_emcy
 from app.wire.nmt import ALL_NODES, NmtCommand
+from app.wire.profibus.pkw import error_text_key
 from app.wire.records import (
     BootUpSeen,
     EmcySeen,
     GapSeen,
     NmtCommandSeen,
     Outcome,
+    Protocol,
     Record,
     RestartSeen,
     SdoAccess,
@@ -26,7 +28,7 @@ from app.wire.records import (
     ValueSeen,
 )
 from app.wire.signs.condition import Condition
-from app.wire.signs.node import ERROR_CODE, FIRST_PARAMETER, NodeSigns, Watch
+from app.wire.signs.node import ERROR_CODES, NodeSigns, Watch, is_set_up
 from app.wire.signs.sign import Sign, SignKind
 
 _NOTHING: Final[tuple[Sign, ...]] = ()
@@ -117,7 +119,7 @@ class SignFinder:
             return _NOTHING
         for limit in node.written_limits.get(address, ()):
             limit.limit_raw = raw
-        if address == ERROR_CODE:
+        if address in ERROR_CODES:
             return self._on_error_code(node, t_ns, raw)
         return self._judge(watch, t_ns, before_ns, raw)
 
@@ -169,11 +171,12 @@ class SignFinder:
         node = self._node(seen.bus, seen.node)
         details: dict[str, Any] = {"address": seen.address.short, "client": seen.client.value}
         if seen.outcome is Outcome.ABORTED and seen.abort_code is not None:
+            of_pkw = seen.protocol is Protocol.PKW
             details |= {
                 "subject": seen.address.short,
                 "abort_code": seen.abort_code,
-                "abort_code_hex": f"{seen.abort_code:08X}h",
-                "reason_key": sdo.abort_text_key(seen.abort_code),
+                "abort_code_hex": str(seen.abort_code) if of_pkw else f"{seen.abort_code:08X}h",
+                "reason_key": (error_text_key if of_pkw else sdo.abort_text_key)(seen.abort_code),
             }
             return (self._sign(seen.t_ns, node, SignKind.WRITE_ABORTED, Severity.WARNING, details),)
         return self._on_written(node, seen, details) if seen.outcome is Outcome.DONE else _NOTHING
@@ -184,7 +187,7 @@ class SignFinder:
         entry = None if node.description is None else node.description.entries.get(seen.address)
         if watch is None or entry is None or seen.data is None or seen.data == watch.data:
             return _NOTHING
-        if not entry.is_parameter or entry.address.major < FIRST_PARAMETER:
+        if not entry.is_parameter or not is_set_up(entry.address):
             return _NOTHING
         details |= {"subject": seen.address.short, "name": entry.title, "unit": entry.quantity.unit}
         for form, data in (("", seen.data), ("was_", watch.data)):

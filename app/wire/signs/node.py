@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
-from app.model.address import Address
+from app.model.address import Address, Addressing
 from app.model.datatypes import DataType, decode_raw
 from app.model.description import Description
 from app.wire.events import Severity
@@ -16,9 +16,15 @@ from app.wire.signs.condition import Condition
 from app.wire.signs.limits import WatchedLimit, watched_limits
 from app.wire.signs.sign import Sign, SignKind
 
-ERROR_CODE: Final = Address(0x603F)
+ERROR_CODES: Final = (Address(0x603F), Address(0, 36, Addressing.PKW))
+"""Of CiA 402, and of DSP-408 on PROFIBUS."""
 FIRST_PARAMETER: Final = 0x2000
 """Below it are the objects of communication (CiA 301): who writes them sets up a bus, no drive."""
+
+
+def is_set_up(address: Address) -> bool:
+    """Whether it is a parameter of the drive, and none of its communication; PKW has no others."""
+    return address.addressing is Addressing.PKW or address.major >= FIRST_PARAMETER
 
 
 class Watch:
@@ -92,7 +98,7 @@ class NodeSigns:
             self._watch(limit.limit_at, description)
             self.written_limits.setdefault(limit.limit_at, []).append(limit)
         for entry in description:
-            if (entry.is_parameter and entry.address.major >= FIRST_PARAMETER) or entry.address == ERROR_CODE:
+            if (entry.is_parameter and is_set_up(entry.address)) or entry.address in ERROR_CODES:
                 self._watch(entry.address, description)
 
     def _watch(self, address: Address, description: Description) -> Watch:

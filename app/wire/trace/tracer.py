@@ -27,8 +27,11 @@ from app.wire.records import (
     Outcome,
     Record,
     SdoSeen,
+    SlaveSeen,
+    SlaveState,
     TransactionSeen,
 )
+from app.wire.trace.fdl_told import FdlTold
 from app.wire.trace.service import Service, Speaker
 
 _SDO: Final = (Service.SDO_REQUEST, Service.SDO_RESPONSE)
@@ -49,7 +52,7 @@ Item = Frame | Gap
 
 
 class Step(Enum):
-    """Protocol step of an SDO frame (CiA 301, 7.2.4.3), or what a Modbus message asks for or answers."""
+    """Protocol step of an SDO frame (CiA 301, 7.2.4.3), or what a Modbus message or a PROFIBUS telegram is about."""
 
     READ = "read"
     READ_ANSWER = "read-answer"
@@ -73,6 +76,15 @@ class Step(Enum):
     DICTIONARY = "dictionary"
     ARRAY_READ = "array-read"
     ARRAY_WRITE = "array-write"
+    FDL_STATUS = "fdl-status"
+    SLAVE_DIAG = "slave-diag"
+    SET_PRM = "set-prm"
+    CHK_CFG = "chk-cfg"
+    GET_CFG = "get-cfg"
+    DATA_EXCHANGE = "data-exchange"
+    GLOBAL_CONTROL = "global-control"
+    FDL_OTHER = "fdl-other"
+    TOKEN = "token"
     EXCEPTION = "exception"
     ABORT = "abort"
     UNKNOWN = "unknown"
@@ -144,7 +156,7 @@ class TraceRow(NamedTuple):
     ``step``, ``address``, ``value`` and ``abort_code`` are of SDO frames and of Modbus, None where there is none.
     ``value`` is what an expedited write asks for, or what a transfer brought that this very frame completed.
     ``records`` are those that this frame made known. ``read`` and ``written`` are the first register and how many of a
-    Modbus request, ``exception`` is the code of a refusal.
+    Modbus request, ``exception`` is the code of a refusal. ``fdl`` is what a PROFIBUS telegram says.
     """
 
     item: Item
@@ -157,6 +169,7 @@ class TraceRow(NamedTuple):
     read: tuple[int, int] | None = None
     written: tuple[int, int] | None = None
     exception: int | None = None
+    fdl: FdlTold | None = None
 
     @property
     def t_ns(self) -> int:
@@ -169,6 +182,8 @@ class TraceRow(NamedTuple):
         if self.step in (Step.ABORT, Step.EXCEPTION) or self.speaker.service in (Service.ERROR, Service.GAP):
             return Tone.ERROR
         tones = {_tone(record) for record in self.records}
+        if self.fdl is not None and self.fdl.is_refusal:
+            tones.add(Tone.WARNING)
         return next((tone for tone in (Tone.ERROR, Tone.WARNING) if tone in tones), Tone.PLAIN)
 
     @property
@@ -199,6 +214,8 @@ def _tone(record: Record) -> Tone:
         return Tone.PLAIN if record.code == NO_ERROR else Tone.ERROR
     if isinstance(record, MalformedSeen | MalformedAduSeen | GapSeen):
         return Tone.ERROR
+    if isinstance(record, SlaveSeen):
+        return Tone.WARNING if record.state is SlaveState.ABSENT else Tone.PLAIN
     return Tone.WARNING if isinstance(record, OrphanSeen) else Tone.PLAIN
 
 

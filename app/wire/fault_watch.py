@@ -6,23 +6,42 @@ reason. A code without the state Fault is a warning (CiA 402, 603Fh).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, Final
+from collections.abc import Callable, Mapping
+from typing import Any, Final, NamedTuple
 
-from app.model.address import Address
+from app.model.address import Address, Addressing
 from app.model.axis_state import AxisState
 from app.wire.records import FaultSeen, ValueSeen
 
-STATUSWORD: Final = Address(0x6041)
-ERROR_CODE: Final = Address(0x603F)
-_FAULT: Final = (AxisState.FAULT, AxisState.FAULT_REACTION_ACTIVE)
 _BYTES: Final = 2
+_STATE: Final = 0x0F
+"""Bits of the statusword of DSP-408 that tell the state."""
+
+
+class FaultPlaces(NamedTuple):
+    """Where a device shows its faults; ``in_fault`` judges its statusword."""
+
+    statusword: Address
+    error_code: Address
+    in_fault: Callable[[int], bool]
+
+
+CIA402: Final = FaultPlaces(
+    Address(0x6041),
+    Address(0x603F),
+    lambda word: AxisState.of(word) in (AxisState.FAULT, AxisState.FAULT_REACTION_ACTIVE),
+)
+DSP408: Final = FaultPlaces(
+    Address(0, 38, Addressing.PKW), Address(0, 36, Addressing.PKW), lambda word: word & _STATE in (0x1, 0x3, 0x7)
+)
+"""FAULT, FAULT_HOLD and FAULT_REACTION: not ready, and yet in a state (ED2 manual, 4.8.3 and 5.7)."""
 
 
 class FaultWatch:
     """What the values of one device have told. ``fault`` None: its statusword was not seen; ``code`` 0: no error."""
 
-    def __init__(self) -> None:
+    def __init__(self, places: FaultPlaces = CIA402) -> None:
+        self._places = places
         self.fault: bool | None = None
         self.code = 0
 
@@ -32,14 +51,15 @@ class FaultWatch:
 
     def see(self, value: ValueSeen) -> FaultSeen | None:
         """One value; what it tells of a fault, if that is new."""
-        if value.address not in (STATUSWORD, ERROR_CODE) or len(value.data) != _BYTES:
+        statusword, error_code, in_fault = self._places
+        if value.address not in (statusword, error_code) or len(value.data) != _BYTES:
             return None
         number = int.from_bytes(value.data, "little")
-        new = self._state(number) if value.address == STATUSWORD else self._error(number)
+        new = self._state(in_fault(number)) if value.address == statusword else self._error(number)
         return FaultSeen(value.t_ns, value.bus, value.node, self.fault, self.code) if new else None
 
-    def _state(self, statusword: int) -> bool:
-        before, self.fault = self.fault, AxisState.of(statusword) in _FAULT
+    def _state(self, fault: bool) -> bool:
+        before, self.fault = self.fault, fault
         if self.fault:
             return before is False or (before is None and not self.code)
         return bool(before) and not self.code
