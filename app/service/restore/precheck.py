@@ -8,6 +8,7 @@ from typing import Final
 
 from app.errors import DeviceError, NoAnswerError
 from app.model.address import Address
+from app.model.axis_machine import StateMachine
 from app.model.datatypes import Raw
 from app.model.description import Description
 from app.model.restore.plan import Plan, StepKind
@@ -20,7 +21,8 @@ from app.service.connection import Connection
 from app.service.devices import Target
 from app.service.gate import BARE_TURBINE
 from app.service.restore.order import Given, Objection, Order, Refusal
-from app.service.restore.survey import STATUSWORD, VELOCITY, Survey, is_driven, read_integer, stage_on
+from app.service.restore.survey import VELOCITY, Survey, is_driven, read_integer, stage_on
+from app.service.stop import machine_of
 
 MASTER_QUIET_NS: Final = 10_000_000_000
 """A master that was seen within so long is at work."""
@@ -146,9 +148,9 @@ def objections_to_state(found: Survey) -> Iterator[Refusal]:
     """What speaks against writing these devices now."""
     for report in found.reports:
         slug, values = report.target.slug, report.values
-        status = values.get(STATUSWORD)
-        if STATUSWORD in report.target.description.entries:
-            yield from _objections_to_drive(report.target, values, status)
+        machine = report.target.description.machine
+        if machine is not None:
+            yield from _objections_to_drive(report.target, machine, values)
         main, supply = values.get(PMM_STATUS), values.get(SUPPLY_STATUS)
         entries = report.target.description.entries
         unknown = [a for a in (PMM_STATUS, SUPPLY_STATUS) if a in entries and not isinstance(values.get(a), int)]
@@ -158,10 +160,11 @@ def objections_to_state(found: Survey) -> Iterator[Refusal]:
             yield Refusal(Objection.SUPPLY, slug, {"status": f"{main:04X}h" if isinstance(main, int) else "–"})
 
 
-def _objections_to_drive(target: Target, values: Mapping[Address, Raw], status: Raw | None) -> Iterator[Refusal]:
+def _objections_to_drive(target: Target, machine: StateMachine, values: Mapping[Address, Raw]) -> Iterator[Refusal]:
+    status = values.get(machine.statusword)
     if not isinstance(status, int):
         yield Refusal(Objection.DRIVE_UNKNOWN, target.slug)
-    elif stage_on(status):
+    elif stage_on(machine, status):
         yield Refusal(Objection.DRIVE_ENABLED, target.slug, {"status": f"{status:04X}h"})
     speed = _scaled(target, VELOCITY, values)
     if speed is None and VELOCITY in target.description.entries and isinstance(status, int):
@@ -200,14 +203,15 @@ async def objections_to_nameless_axes(connection: Connection, targets: Iterable[
         return []
     known, found = {target.slug for target in targets}, []
     for axis in connection.axes():
+        machine = machine_of(axis.target)
         if axis.target.slug in known:
             continue
         try:
-            status = await read_integer(connection, axis.target, STATUSWORD)
+            status = await read_integer(connection, axis.target, machine.statusword)
         except NoAnswerError:
             found.append(Refusal(Objection.DRIVE_UNKNOWN, axis.target.slug))
         else:
-            if status is not None and is_driven(status):
+            if status is not None and is_driven(machine, status):
                 found.append(Refusal(Objection.DRIVE_ENABLED, axis.target.slug, {"status": f"{status:04X}h"}))
     return found
 
@@ -219,7 +223,7 @@ def _other_axes(connection: Connection, station: str) -> Iterable[Target]:
     return (
         target
         for target in connection.targets
-        if target.slug.rpartition("/")[0] in blades and STATUSWORD in target.description.entries
+        if target.slug.rpartition("/")[0] in blades and target.description.machine is not None
     )
 
 

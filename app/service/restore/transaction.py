@@ -90,6 +90,8 @@ class Transaction:
         self._back_commands: Counts | None = None
         self._deadline: float | None = None
         self._returning = False
+        self._restarted: set[str] = set()
+        """Devices that have restarted on the way that is gone now."""
         self._ordered = False
         """A person has taken it up after an interruption: whether the station is fit is not known."""
 
@@ -124,6 +126,26 @@ class Transaction:
         self._confirmed_by = person
         self._hands.decided()
         self._decided.set()
+        return True
+
+    @property
+    def switching(self) -> str | None:
+        """The device that somebody is to switch off and on now; None where none is."""
+        waiting = self._hands.switching
+        return None if waiting is None else waiting.slug
+
+    @property
+    def switch_left_s(self) -> float | None:
+        """Seconds until it goes on without that; None where it is not awaited."""
+        waiting = self._hands.switching
+        return None if waiting is None else max(0.0, waiting.until_s - self._hands.monotonic())
+
+    def go_on_unproven(self) -> bool:
+        """Nobody switches the device off and on: what was saved stays not proven. False where that is not awaited."""
+        waiting = self._hands.switching
+        if waiting is None:
+            return False
+        waiting.without = True
         return True
 
     def turn_back(self, person: str) -> None:
@@ -287,7 +309,7 @@ class Transaction:
             await self._do(step, direction, confirm_s)
             self.done += 1
         saved = {step.device for step in steps if step.kind is StepKind.SAVE}
-        restarted = {step.device for step in steps if step.kind is StepKind.RESTART}
+        restarted = self._restarted
         unproven = await self._prove(bool(restarted), goals, direction)
         self._look_for_people(direction)
         proven = bool(saved) and saved <= restarted and not unproven
@@ -307,8 +329,8 @@ class Transaction:
             await self._confirm(direction, confirm_s)
         elif step.kind is StepKind.SAVE:
             await self._hands.save(step.device, direction, step.category)
-        elif step.kind is StepKind.RESTART:
-            await self._hands.restart(step.device, direction)
+        elif step.kind is StepKind.RESTART and await self._hands.restart(step.device, direction):
+            self._restarted.add(step.device)
 
     async def _enter_for(self, step: Step, direction: Direction) -> None:
         """The state that the step belongs to."""
