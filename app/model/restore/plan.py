@@ -37,6 +37,8 @@ class Why(Enum):
     NEEDS_EXPERT = "needs-expert"
     CONDITION = "condition"
     """The device takes it only while an object that nobody can write holds another value; ``details`` say which."""
+    NOT_SAVABLE = "not-savable"
+    """With this value the device takes no save: nothing that is written could be kept."""
     READ_ONLY = "read-only"
     UNREADABLE = "unreadable"
     """The device did not tell its present value, so that nothing could be undone."""

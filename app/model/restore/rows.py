@@ -72,6 +72,8 @@ def _refusal(
     unmet = _unmet(device, entry, target)
     if unmet is not None:
         return Why.CONDITION, unmet
+    if not options.returning and breaks_saving(device.description, entry.address, target):
+        return Why.NOT_SAVABLE, {}
     if not options.returning and _irrevocable(device, entry, options):
         return Why.IRREVOCABLE, {}
     misfit = _misfit(device.description, entry, target, options)
@@ -83,6 +85,13 @@ def _refusal(
             return Why.LEFT_BY_FEATHER, {"source": source.short}
         return Why.NOT_SELECTED, {}
     return None, {}
+
+
+def breaks_saving(description: Description, address: Address, raw: Raw) -> bool:
+    """True where the device takes no command to save while the object holds ``raw``."""
+    commands = (description.entry(command.address) for command in description.save)
+    conditions = (condition for entry in commands for condition in entry.requires)
+    return any(condition.address == address and raw not in condition.values for condition in conditions)
 
 
 def _unmet(device: DeviceValues, entry: Entry, target: Raw) -> Mapping[str, str] | None:

@@ -98,6 +98,8 @@ class Objection(Enum):
     RESTORE_OPEN = "restore-open"
     RULES = "rules"
     NO_ORDER = "no-order"
+    CANNOT_SAVE = "cannot-save"
+    """In its state the device takes no save: what is written could not be kept."""
     NEW_ADDRESS = "new-address"
     """A restart would bring another address into force: the device could not be read again at the end."""
 

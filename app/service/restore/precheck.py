@@ -11,8 +11,9 @@ from app.model.address import Address
 from app.model.axis_machine import StateMachine
 from app.model.datatypes import Raw
 from app.model.description import Description
-from app.model.restore.plan import Plan, StepKind
+from app.model.restore.plan import Plan, StepKind, Treatment
 from app.model.sets import Identity, ParameterSet
+from app.model.station import Place
 from app.model.values import quantity_of, to_scaled
 from app.model.variant import variant_of
 from app.recording.writer import RecorderState
@@ -56,6 +57,20 @@ def objections_to_plan(plan: Plan) -> Iterator[Refusal]:
             yield Refusal(Objection.NEW_ADDRESS, slug)
     if not any(step.kind is StepKind.WRITE for step in plan.steps) and not plan.unordered:
         yield Refusal(Objection.NOTHING_TO_DO)
+
+
+def objections_to_saving(plan: Plan, found: Survey) -> Iterator[Refusal]:
+    """Devices that would take no save at the end, such as one that is operated locally."""
+    wanted = {row.place: row.wanted for row in plan.rows if row.treatment is Treatment.WRITE}
+    for slug in dict.fromkeys(step.device for step in plan.steps if step.kind is StepKind.SAVE):
+        device = found.station.device(slug)
+        commands = () if device is None else device.description.save
+        for condition in (one for command in commands for one in device.description.entry(command.address).requires):
+            place = Place(slug, condition.address)
+            raw = wanted.get(place, found.station.raw(place))
+            if raw is not None and raw not in condition.values:
+                needs = f"{condition.address.short} = {' / '.join(map(str, condition.values))}"
+                yield Refusal(Objection.CANNOT_SAVE, slug, {"needs": needs, "found": str(raw)})
 
 
 def objections_to_sets(order: Order, found: Survey, nameplates: Mapping[str, str | None]) -> Iterator[Refusal]:

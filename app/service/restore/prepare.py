@@ -81,6 +81,7 @@ async def prepare(
         *precheck.objections_to_state(found),
         *precheck.objections_to_surroundings(connection, connection.stamper()),
         *precheck.objections_to_plan(plan),
+        *precheck.objections_to_saving(plan, found),
         *await precheck.objections_to_nameless_axes(connection, targets),
     ]
     by_hand = tuple(target.slug for target in targets if connection.driver(target).restarts_by_hand)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Awaitable, Mapping, Sequence
+from collections.abc import Awaitable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Final
@@ -295,10 +295,11 @@ class Transaction:
         goals = self._terms.wanted(direction)
         self.done, self.total = 0, len(steps)
         checked = restarting = False
-        for step in steps:
+        for number, step in enumerate(steps):
             self._look_for_people(direction)
             if step.kind is StepKind.SAVE and not checked:
-                await self._hands.check(goals)
+                later = self._changed_by(steps[number:])
+                await self._hands.check({place: raw for place, raw in goals.items() if place not in later})
                 checked = True
             if step.kind is StepKind.RESTART and not restarting:
                 await self._hands.guard(
@@ -321,6 +322,16 @@ class Transaction:
             self._tell(Kind.RESTORE_DONE)
         await self._log.enter(RestoreState.ROLLED_BACK if back else RestoreState.DONE, proven=proven, unproven=unproven)
         return End.OLD if back else End.NEW
+
+    def _changed_by(self, steps: Iterable[Step]) -> frozenset[Place]:
+        """What the steps write, and what the device changes by itself with that."""
+        written = [step.place for step in steps if step.place is not None]
+        effects = (
+            Place(place.slug, effect.address)
+            for place in written
+            for effect in self.descriptions[place.slug].entry(place.address).effects
+        )
+        return frozenset((*written, *effects))
 
     async def _do(self, step: Step, direction: Direction, confirm_s: float | None) -> None:
         if step.kind in (StepKind.WRITE, StepKind.AUXILIARY):

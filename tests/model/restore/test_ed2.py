@@ -94,13 +94,22 @@ def test_a_window_of_nothing_is_refused() -> None:
     assert [one.rule_id for one in plan.blockers] == ["ed2.travel_window"]
 
 
-def test_local_operation_is_left_first_and_entered_last() -> None:
+def test_local_operation_is_left_first_and_kept_out_of_it_for_then_nothing_could_be_saved() -> None:
     change = {"12/207": 9000}
     bus, local = {LOCAL: 0}, {LOCAL: 1, DEVICE_MODE: 2}
     assert writes(plan_of(local, {**bus, **change}))[0] == ("write", LOCAL, 0)
-    assert writes(plan_of(bus, {**local, **change}))[-1] == ("write", LOCAL, 1)
+    entered = plan_of(bus, {**local, **change})
+    assert LOCAL not in [address for _, address, _ in writes(entered)]
+    assert [row.why for row in entered.rows if row.place.address.short == LOCAL] == [Why.NOT_SAVABLE]
     inside = writes(plan_of(local, {**local, **change}))
     assert inside == [("auxiliary", LOCAL, 0), ("write", "12/207", 9000), ("auxiliary", LOCAL, 1)]
+
+
+def test_on_the_way_back_local_operation_is_entered_once_all_is_saved() -> None:
+    back = PlanOptions(same_unit={SLUG: True}, returning=True, save=frozenset({SLUG}))
+    plan = plan_of({LOCAL: 0}, {LOCAL: 1, DEVICE_MODE: 2, "12/207": 9000}, back)
+    kinds = [(step.kind.value, None if step.place is None else step.place.address.short) for step in plan.steps]
+    assert kinds.index(("save", None)) < kinds.index(("write", LOCAL)) < kinds.index(("prove", None))
 
 
 def test_single_axes_are_reached_from_open_loop_by_a_mode_that_allows_it() -> None:
@@ -163,7 +172,7 @@ def stations(draw: st.DrawFn) -> Changes:
 @given(stations(), stations())
 @example({MODE: 9, DEVICE_MODE: 2}, {MODE: -1, DEVICE_MODE: 1, AXES: 1})
 def test_from_any_state_to_any_other_there_is_a_legal_way(now: Changes, wanted: Changes) -> None:
-    plan = plan_of(now, wanted)
+    plan = plan_of(now, wanted, PlanOptions(same_unit={SLUG: True}, returning=True, save=frozenset()))
     assert not plan.unordered, writes(plan)
     reached = walk(now, plan)
     goal = station(wanted).devices[0].values
