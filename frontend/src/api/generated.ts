@@ -1840,6 +1840,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/live/restores/{restore_id}/unproven": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Go On Unproven
+         * @description Do without the proof of a restart: nobody switches the device off and on now.
+         */
+        post: operations["go_on_unproven"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/live/scope": {
         parameters: {
             query?: never;
@@ -8532,14 +8552,15 @@ export interface components {
          * @description A restore with all its values and steps.
          *
          *     ``left_s``: how long the person still has to confirm; null where that is not awaited. ``proven``: by a restart;
-         *     where it is false at the end, the values are saved and not yet proven by one. ``done`` of ``total`` steps of the
+         *     where it is false at the end, the values are saved and not yet proven by one. ``switching``: the device that
+         *     somebody is to switch off and on now, for ``switch_left_s`` seconds at most. ``done`` of ``total`` steps of the
          *     way that runs. ``blocks``: writes, saves and restarts of the station are refused. ``can``: what a person may order.
          */
         RestoreDoc: {
             /** Blocks */
             blocks: boolean;
             /** Can */
-            can: ("confirm" | "roll-back" | "resume" | "give-up")[];
+            can: ("confirm" | "roll-back" | "resume" | "unproven" | "give-up")[];
             /** Cause Details */
             cause_details: {
                 [key: string]: string;
@@ -8584,6 +8605,10 @@ export interface components {
             station: string;
             /** Steps */
             steps: components["schemas"]["RestoreStepDoc"][];
+            /** Switch Left S */
+            switch_left_s: number | null;
+            /** Switching */
+            switching: string | null;
             /** Total */
             total: number;
             /** Turbine */
@@ -8671,11 +8696,13 @@ export interface components {
          * @description A plan. It can be begun where nothing is refused; ``hash`` names all that a person agrees to.
          *
          *     ``findings``: what the rules say of the station as it will be; ``blockers``: those of them that forbid it;
-         *     ``mended``: what is broken now and will not be any more.
+         *     ``mended``: what is broken now and will not be any more. ``by_hand``: devices without a restart command.
          */
         RestorePlanDoc: {
             /** Blockers */
             blockers: components["schemas"]["RestoreFinding"][];
+            /** By Hand */
+            by_hand: string[];
             /** Findings */
             findings: components["schemas"]["RestoreFinding"][];
             /** Hash */
@@ -10399,6 +10426,26 @@ export interface components {
             start_t_ns: number;
         };
         /**
+         * TraceFdl
+         * @description Of a PROFIBUS telegram: who speaks to whom, and the access points; None where it does not say.
+         *
+         *     ``pkw``: its data begin with PKW, the process data follow. ``sound``: it is a whole telegram without an error.
+         */
+        TraceFdl: {
+            /** Destination */
+            destination: number | null;
+            /** Dsap */
+            dsap: number | null;
+            /** Pkw */
+            pkw: boolean;
+            /** Sound */
+            sound: boolean;
+            /** Source */
+            source: number | null;
+            /** Ssap */
+            ssap: number | null;
+        };
+        /**
          * TraceFilter
          * @description Empty means any; all that is given must hold. ``id`` comes back with each answer.
          *
@@ -10490,7 +10537,8 @@ export interface components {
          * @description One frame, or a gap in the traffic. ``start_t_ns``: the first request of the transfer that this frame ended.
          *
          *     Of Modbus TCP ``transaction`` is set, ``peer`` is the client's end of the connection, ``number`` the function
-         *     code and ``dlc`` the bytes of the ADU; ``can_id`` is 0.
+         *     code and ``dlc`` the bytes of the ADU; ``can_id`` is 0. Of PROFIBUS ``fdl`` is set, and ``dlc`` is the bytes of the
+         *     telegram.
          */
         TraceLine: {
             /** Bus */
@@ -10510,6 +10558,7 @@ export interface components {
             dlc: number;
             /** Extended */
             extended: boolean;
+            fdl: components["schemas"]["TraceFdl"] | null;
             /** Items */
             items: components["schemas"]["TraceItem"][];
             /** Node */
@@ -19255,6 +19304,78 @@ export interface operations {
         };
     };
     roll_back_restore: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                restore_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /** @example {} */
+                "application/json": components["schemas"]["Nothing"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["RestoreDoc"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    go_on_unproven: {
         parameters: {
             query?: never;
             header?: never;

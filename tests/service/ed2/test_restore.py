@@ -24,6 +24,8 @@ from tests.service.ed2.conftest import AXIS, Bench, desk_of, kinds, steps
 from tests.service.motion.ed2_rig import ORDER, Cylinders
 from tests.web.rig import wait_until
 
+pytestmark = pytest.mark.alone  # a line that stands still for a second has lost its slave
+
 CHANGES: dict[str, Raw] = {"12/207": 9_000, "1/106": 1, "1/100": -100, "1/101": 4_900, "12/61": 800, "12/64": 1_500}
 MODES: dict[str, Raw] = {"0/40": -1, "0/53": 1}
 
