@@ -64,8 +64,10 @@ def objections_to_saving(plan: Plan, found: Survey) -> Iterator[Refusal]:
     wanted = {row.place: row.wanted for row in plan.rows if row.treatment is Treatment.WRITE}
     for slug in dict.fromkeys(step.device for step in plan.steps if step.kind is StepKind.SAVE):
         device = found.station.device(slug)
-        commands = () if device is None else device.description.save
-        for condition in (one for command in commands for one in device.description.entry(command.address).requires):
+        if device is None:
+            continue
+        saves = (device.description.entry(command.address) for command in device.description.save)
+        for condition in (one for entry in saves for one in entry.requires):
             place = Place(slug, condition.address)
             raw = wanted.get(place, found.station.raw(place))
             if raw is not None and raw not in condition.values:

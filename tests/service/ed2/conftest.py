@@ -74,7 +74,7 @@ class Bench:
 
     async def switch(self) -> None:
         """Off, until the bus has noticed it, and on."""
-        station = self.connection.driver(self.connection.target(AXIS))._line.stations[6]  # type: ignore[attr-defined]
+        station = self.connection.driver(self.connection.target(AXIS))._line.stations[6]
         self.twin.wired.power_off()
         await wait_until(lambda: station.state.value == "absent")
         self.twin.wired.power_on()

@@ -20,8 +20,8 @@ from app.twins.ed2.states import State
 from app.twins.object_store import RefusedAccessError
 from app.wire.sdo import Abort
 from tests.drivers.profibus_rig import CONTROLWORD, ED2, LOCAL
-from tests.service.ed2.conftest import AXIS, Bench, desk_of, kinds, steps
-from tests.service.motion.ed2_rig import ORDER, Cylinders
+from tests.service.ed2.conftest import Bench, desk_of, kinds, steps
+from tests.service.motion.ed2_rig import AXIS, ORDER, Cylinders
 from tests.web.rig import wait_until
 
 pytestmark = pytest.mark.alone  # a line that stands still for a second has lost its slave
@@ -157,7 +157,7 @@ async def test_power_that_goes_in_the_midst_is_noticed_and_the_old_values_come_b
 
     bench.twin.wired.do(lambda: setattr(cell, "guard", dies))
     restore_id = await bench.begin(CHANGES)
-    station = bench.connection.driver(bench.connection.target(AXIS))._line.stations[6]  # type: ignore[attr-defined]
+    station = bench.connection.driver(bench.connection.target(AXIS))._line.stations[6]
     await wait_until(lambda: station.state.value == "absent")
     bench.twin.wired.power_on()
     end = await bench.desk.wait(restore_id)
