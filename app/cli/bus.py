@@ -29,7 +29,7 @@ from app.service.backup import ReadReport, read_device, readable
 from app.service.connection import Connection
 from app.service.devices import Target
 from app.service.identify import Asked
-from app.service.save import restart, save
+from app.service.save import BY_HAND_S, restart, save
 from app.service.write import WriteResult, write_text
 
 
@@ -266,6 +266,8 @@ async def _save_one(connection: Connection, target: Target, output: Output, cate
 async def _restart(arguments: argparse.Namespace, output: Output) -> int:
     async with connected(arguments, output) as connection:
         target = target_of(connection, arguments.target)
+        if connection.driver(target).restarts_by_hand:
+            output.say("cli.restart_by_hand", device=target.slug, within_s=f"{BY_HAND_S:.0f}")
         async with audited(arguments, output, connection):
             took = await restart(connection.driver(target), target, connection.journal, connection.stamper)
         text = output.texts("cli.restart_done", device=target.slug, took_s=f"{took.took_s:.2f}")

@@ -278,11 +278,17 @@ async def _follow(arguments: argparse.Namespace, told: Told, desk: Desk, restore
     with contextlib.suppress(NotImplementedError):  # Windows: Ctrl-C ends the command, which leaves it incomplete
         loop.add_signal_handler(signal.SIGINT, lambda: _turn_back(desk, restore_id, person, output))
     asked = False
+    told_of: str | None = None
     while (transaction := desk.at_work(restore_id)) is not None:
         if transaction.state is RestoreState.AWAITING_CONFIRMATION and not asked:
             asked = True
             output.say("cli.restore_confirm", within_s=f"{transaction.left_s or 0:.0f}", word=_word(output))
             _read_line(loop, lambda line: _typed(desk, restore_id, person, output, line))
+        elif (slug := transaction.switching) is not None and slug != told_of:
+            told_of = slug
+            output.say("cli.restore_switch", device=slug, within_s=f"{transaction.switch_left_s or 0:.0f}")
+            if sys.stdin.isatty():
+                _read_line(loop, lambda _line: _without(desk, restore_id, person))
         elif transaction.state is not RestoreState.AWAITING_CONFIRMATION:
             state = output.texts(transaction.state.text_key)
             output.progress("cli.restore_at", state=state, done=transaction.done, total=transaction.total)
@@ -309,6 +315,12 @@ def _typed(desk: Desk, restore_id: str, person: str, output: Output, line: str) 
         task.add_done_callback(lambda done: done.exception())  # too late: it is told by how the restore ends
     else:
         _turn_back(desk, restore_id, person, output)
+
+
+def _without(desk: Desk, restore_id: str, person: str) -> None:
+    """Enter was pressed: nobody switches the device off and on."""
+    task = asyncio.ensure_future(desk.go_on_unproven(restore_id, person))
+    task.add_done_callback(lambda done: done.exception())  # too late: it is told by how the restore ends
 
 
 def _read_line(loop: asyncio.AbstractEventLoop, typed: Callable[[str], None]) -> None:

@@ -59,6 +59,7 @@ class CanOpenDriver:
 
     ends_when_silent: Final = False
     ends_with_restart: Final = False
+    restarts_by_hand: Final = False
 
     def __init__(
         self,

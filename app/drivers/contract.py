@@ -129,6 +129,10 @@ class Driver(Protocol):
     def ends_with_restart(self) -> bool:
         """Whether a restart of a device ends the connection to it, which is then opened again."""
 
+    @property
+    def restarts_by_hand(self) -> bool:
+        """Whether ``restart`` sends nothing, and waits for somebody who switches the device off and on."""
+
     async def connect(self, timeout_s: float = 5.0) -> None:
         """Open the bus and listen before anything is sent. Raises BusOpenError."""
 

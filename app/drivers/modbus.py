@@ -70,6 +70,7 @@ class ModbusDriver:
 
     ends_when_silent: Final = True
     ends_with_restart: Final = True
+    restarts_by_hand: Final = False
 
     def __init__(
         self, config: ModbusConfig, stamper: Stamper, bus: str = "modbus0",

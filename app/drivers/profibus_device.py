@@ -52,6 +52,9 @@ class ProfibusDevice:
         self.startup = Startup(self)
         self._bus = bus
         self._commands = commands
+        self._written: frozenset[Address] = frozenset()
+        self._written_since = 0
+        """Parameters that were written as process data, and since which start of the station."""
 
     def renew(self, bus: ProfibusBus) -> None:
         """The line was closed and is opened again: all that was known of the station is void."""
@@ -65,9 +68,34 @@ class ProfibusDevice:
     # -- PKW -------------------------------------------------------------------------------------
 
     async def read(self, address: Address, timeout_s: float | None = None, urgent: bool = False) -> bytes:
-        """One parameter, least significant byte first. Raises PkwRefusedError, NoAnswerError, BusLostError."""
+        """One parameter, least significant byte first. Raises PkwRefusedError, NoAnswerError, BusLostError.
+
+        DeviceError where only the zero of our own process data stands there: what the device had before, nobody knows.
+        """
         data, _inputs = await self.read_with_inputs(address, timeout_s, urgent)
+        if not any(data) and address in self.overridden:
+            raise DeviceError(node=self.node, address=str(address), reason_key="profibus.overridden")
         return data
+
+    @property
+    def overridden(self) -> frozenset[Address]:
+        """Kept parameters that process data have set to 0 since the exchange began, and that nobody has written since.
+
+        Process data win over parameters, and before anything is known of a station they are zeros (ED2 manual, 4.6).
+        """
+        station = self.station
+        if station is None or self.description is None:
+            return frozenset()
+        if station.starts != self._written_since:
+            return self._zeroed(station)
+        return self._zeroed(station) - self._written
+
+    def _zeroed(self, station: Station) -> frozenset[Address]:
+        """What its telegram carries to it, is kept, and may be 0."""
+        signals = (signal for word in station.telegram.received for signal in word)
+        addresses = {signal.address for signal in signals if signal.address is not None}
+        entries = (self.description.entries.get(address) for address in addresses) if self.description else ()
+        return frozenset(one.address for one in entries if one is not None and one.saved and one.enumeration is None)
 
     async def read_with_inputs(self, address: Address, timeout_s: float | None, urgent: bool) -> tuple[bytes, bytes]:
         """The parameter, and the process data of the exchange that told it."""
@@ -157,7 +185,18 @@ class ProfibusDevice:
             raise RefusedError(device=str(self.node), address=address.short, reason=reason)
         if value:
             await self.startup.prepare(address)
-        await self.send({signal: value}, address, data, timeout_s, urgent, known)
+        await self.send({signal: value, **self._with_it(signal, value)}, address, data, timeout_s, urgent, known)
+        station = self.required()
+        if station.starts != self._written_since:
+            self._written, self._written_since = frozenset(), station.starts
+        self._written |= {address}
+
+    def _with_it(self, signal: Signal, value: int) -> dict[Signal, int]:
+        """What the device itself changes with a write, where process data carry that too: else they would undo it."""
+        entry = None if self.description is None or signal.address is None else self.description.entries[signal.address]
+        changed = {} if entry is None else {one.address: one.raw for one in entry.effects if value in one.writing}
+        found = ((self._signal(address), raw) for address, raw in changed.items())
+        return {other: raw for other, raw in found if other is not None}
 
     async def _read_back(self, address: Address, data: bytes) -> Written:
         """Process data are not acknowledged one by one: whether the device has taken a value only PKW tells."""

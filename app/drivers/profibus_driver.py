@@ -62,6 +62,7 @@ class ProfibusDriver:
 
     ends_when_silent: Final = True
     ends_with_restart: Final = False
+    restarts_by_hand: Final = True
 
     def __init__(
         self, config: ProfibusConfig, stamper: Stamper, bus: str = "profibus0",

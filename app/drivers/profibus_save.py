@@ -17,7 +17,8 @@ SAVE_TIMEOUT_S: Final = 10.0
 async def save(device: ProfibusDevice, category: str | None) -> None:
     """Save while the axis is not enabled. Not proven before a restart.
 
-    Raises PreconditionError (it is enabled: nothing was saved), UsageError, and what writes raise.
+    Raises PreconditionError (it is enabled, or would keep a zero of our own process data: nothing was saved),
+    UsageError, and what writes raise.
     """
     command = command_of(() if device.description is None else device.description.save, category)
     station = device.station
@@ -28,6 +29,16 @@ async def save(device: ProfibusDevice, category: str | None) -> None:
             needs="an output stage that is off",
             needs_key="saving.needs.stage_off",
             found=f"{station.image.controlword:04X}h",
+        )
+    if device.overridden:
+        first = min(device.overridden)
+        raise PreconditionError(
+            address=first.short,
+            name=device.name(first),
+            needs="a value that was written",
+            needs_key="saving.needs.written",
+            found="0",
+            found_key="profibus.overridden",
         )
     signature = command.signature.to_bytes(4, "little")
     await device.write(command.address, signature, max(command.timeout_s, SAVE_TIMEOUT_S), verify=Verify.ACK)

@@ -124,7 +124,7 @@ class Startup:
             source = _SOURCES.get(signal, signal)
             if signal is CONTROL_WORD or source.address is None:
                 continue
-            data = await self._device.read(source.address)
+            data, _ = await self._device.read_with_inputs(source.address, None, False)
             value = int.from_bytes(data, "little", signed=source.signed)
             values[signal] = min(value, (1 << signal.bits) - 1)
         return values

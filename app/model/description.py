@@ -120,12 +120,14 @@ class QuantityRule:
     """A unit that depends on other objects.
 
     Either a table of the raw value of ``address`` (``choices``), or the rule ``feed`` of CiA 402: a position in units
-    of ``feed`` per ``shaft`` revolutions, shown in degrees: 360 / (feed / shaft) degrees a unit.
+    of ``feed`` per ``shaft`` revolutions, shown in degrees: 360 / (feed / shaft) degrees a unit. ``after``: objects
+    that are put back before what has this unit, for its numbers mean something else until then.
     """
 
     address: Address
     choices: Mapping[int, Quantity] = field(default_factory=dict)
     shaft: Address | None = None
+    after: tuple[Address, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,6 +155,15 @@ class Condition:
     def concerns(self, raw: Raw) -> bool:
         """True where a write of ``raw`` depends on it."""
         return not self.writing or raw in self.writing
+
+
+@dataclass(frozen=True, slots=True)
+class Effect:
+    """A write of one of the raw values ``writing`` has the device itself put ``raw`` into the object at ``address``."""
+
+    address: Address
+    raw: int
+    writing: tuple[int, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -289,7 +300,8 @@ class Entry:
     ``enumeration_rule``, ``bits_rule`` and ``limits_rule`` replace ``enumeration``, ``bits`` and the limits while the
     object that they name is known. A raw value is a multiple of ``step``, or one of ``only`` where that is not empty.
     ``ipv4`` marks an address of the internet, its first number in the highest byte. ``signals`` are the numbers that a
-    telegram of process data knows it by, and ``tool_name`` the name that the maker's own tool gives it.
+    telegram of process data knows it by, and ``tool_name`` the name that the maker's own tool gives it. ``effects`` are
+    what the device itself changes with a write.
     """
 
     address: Address
@@ -335,6 +347,7 @@ class Entry:
     only: tuple[int, ...] = ()
     signals: tuple[int, ...] = ()
     tool_name: str | None = None
+    effects: tuple[Effect, ...] = ()
     pdo_way: PdoWay = PdoWay.BOTH
     line: int = 0
 

@@ -27,6 +27,7 @@ from app.model.description import (
     Bus,
     Condition,
     Description,
+    Effect,
     Entry,
     Enumeration,
     EnumValue,
@@ -69,7 +70,7 @@ _OWN_KEYS: Final = frozenset(("index", "ind", "pnu", "kind", "subs", "elements")
 _ROW_KEYS: Final = frozenset(
     "name section group type access pdo default saved save_category unit scale hex unit_from min max enumeration bits "
     "restore verify requires mirror by_variant note inferred origin timeout_s node_id motion also counts ipv4 "
-    "overwritten_by enumeration_from bits_from limits_from step only signals tool_name".split()
+    "overwritten_by enumeration_from bits_from limits_from step only signals tool_name effects".split()
 )
 _NOT_INHERITED_BY_SUB0: Final = _ROW_KEYS - {"section", "group", "saved", "save_category", "inferred", "origin"}
 _PDO_SIDES: Final = frozenset(side.value for side in PdoSide)
@@ -315,6 +316,10 @@ class _Reader:
             only=tuple(row.get("only", ())),
             signals=tuple(row.get("signals", ())),
             tool_name=_text(row, "tool_name") if "tool_name" in row else None,
+            effects=tuple(
+                Effect(parse_address(one["address"]), _int(one, "value"), tuple(one["writing"]))
+                for one in row.get("effects", ())
+            ),
             line=line,
         )
 
@@ -404,6 +409,8 @@ def _references(entry: Entry) -> Iterator[tuple[str, Address]]:
         yield "unit_from", entry.quantity_rule.address
         if entry.quantity_rule.shaft is not None:
             yield "unit_from shaft", entry.quantity_rule.shaft
+        for address in entry.quantity_rule.after:
+            yield "unit_from after", address
     for what, limit in (("min", entry.minimum), ("max", entry.maximum)):
         if isinstance(limit, LimitRef):
             yield what, limit.address
@@ -416,6 +423,8 @@ def _references(entry: Entry) -> Iterator[tuple[str, Address]]:
             yield key, rule.address
     for condition in entry.requires:
         yield "requires", condition.address
+    for effect in entry.effects:
+        yield "effects", effect.address
     if entry.mirror is not None:
         yield "mirror", entry.mirror.of
 
@@ -514,7 +523,12 @@ def _quantity_rule(row: Mapping[str, Any] | None) -> QuantityRule | None:
         return None
     choices = {int(value, 0): _quantity(choice) for value, choice in row.get("choices", {}).items()}
     shaft = row.get("shaft")
-    return QuantityRule(parse_address(row["address"]), choices, None if shaft is None else parse_address(shaft))
+    return QuantityRule(
+        parse_address(row["address"]),
+        choices,
+        None if shaft is None else parse_address(shaft),
+        tuple(map(parse_address, row.get("after", ()))),
+    )
 
 
 def _table_rule(row: Mapping[str, Any] | None) -> TableRule | None:

@@ -68,6 +68,7 @@ class Kind(Enum):
     RESTORE_CONFIRMED = "restore_confirmed"
     RESTORE_TURNED_BACK = "restore_turned_back"
     RESTORE_RESUMED = "restore_resumed"
+    RESTORE_UNPROVEN = "restore_unproven"
     RESTORE_DONE = "restore_done"
     RESTORE_ROLLED_BACK = "restore_rolled_back"
     RESTORE_INCOMPLETE = "restore_incomplete"
@@ -114,6 +115,7 @@ _WARNINGS: Final = (
     Kind.RESTORE_BEGUN,
     Kind.RESTORE_TURNED_BACK,
     Kind.RESTORE_RESUMED,
+    Kind.RESTORE_UNPROVEN,
     Kind.RESTORE_ROLLED_BACK,
     Kind.RESTORE_GIVEN_UP,
     Kind.PDO_CHANGED,

@@ -19,6 +19,11 @@ STAMP: Final = (Address(0x1020, 1), Address(0x1020, 2))
 """Date and time of the configuration: a device that has them keeps them with each save (CiA 301, 7.5.2.22)."""
 
 
+RESTART_S: Final = 15.0
+BY_HAND_S: Final = 120.0
+"""Time to go to a cabinet and back."""
+
+
 @dataclass(frozen=True, slots=True)
 class Took:
     """An action that the device acknowledged, and how long it took in seconds.
@@ -80,10 +85,12 @@ async def restart(
     target: Target,
     journal: Journal,
     now_ns: Callable[[], int],
-    timeout_s: float = 15.0,
+    timeout_s: float | None = None,
     sure: Callable[[], None] | None = None,
 ) -> Took:
-    """Restart the device and wait until it says that it is back. Raises NoAnswerError.
+    """Restart the device, or wait until somebody has switched it off and on, until it is back. Raises NoAnswerError.
+
+    ``timeout_s``: by default 15 s, and ``BY_HAND_S`` for a person.
 
     ``sure`` raises what speaks against it at the last moment: nothing else comes between it and the command.
     """
@@ -93,7 +100,8 @@ async def restart(
         sure()
     started_ns = now_ns()
     journal.note(Kind.RESTART, target.slug)
-    await driver.restart(target.node, timeout_s)
+    default_s = BY_HAND_S if driver.restarts_by_hand else RESTART_S
+    await driver.restart(target.node, default_s if timeout_s is None else timeout_s)
     back_ns = now_ns()
     proven = None if stamp is None else await _bears(driver, target, stamp)
     if proven is not None:

@@ -459,8 +459,21 @@ class LiveState:
         node.silent = seen.state is SlaveState.ABSENT
         if not node.silent:
             node.answered_ns = seen.t_ns
+        exchanging = seen.state is SlaveState.EXCHANGING
+        if exchanging and node.exchanging is False:
+            self._came_back(node, seen.t_ns)
+        if exchanging or node.exchanging is not None:
+            node.exchanging = exchanging
         self._touch_node(node)
         self._add_event(seen.t_ns, seen.bus, seen.node, tell_slave(seen))
+
+    def _came_back(self, node: LiveNode, t_ns: int) -> None:
+        """A slave that had to be parametrised again was switched off, or only cut off: nobody can tell which.
+
+        So what it holds has to be read again, and proves nothing of what it has stored.
+        """
+        self._touch_cells(node.memory.gap())
+        node.boot_ns, node.boots = t_ns, node.boots + 1
 
     def _on_diagnosis(self, seen: DiagnosisSeen) -> None:
         node = self._node(seen.bus, seen.node)

@@ -40,9 +40,9 @@ class LiveNode:
     """All that is kept of a node. ``seen``: it has said something itself."""
 
     __slots__ = (
-        "answered_ns", "boot_ns", "boots", "bus", "commanded", "diagnosis", "emcy_code", "emcy_ns", "first_interval_ns",
-        "heartbeat_ns", "interval_ns", "memory", "number", "other_client_ns", "period_ns", "reset_communication",
-        "seen", "silent", "state", "version",
+        "answered_ns", "boot_ns", "boots", "bus", "commanded", "diagnosis", "emcy_code", "emcy_ns", "exchanging",
+        "first_interval_ns", "heartbeat_ns", "interval_ns", "memory", "number", "other_client_ns", "period_ns",
+        "reset_communication", "seen", "silent", "state", "version",
     )  # fmt: skip
 
     def __init__(self, bus: str, number: int) -> None:
@@ -65,6 +65,8 @@ class LiveNode:
         self.answered_ns: int | None = None
         self.diagnosis: str | None = None
         """What a PROFIBUS slave told of itself last, to tell what is new."""
+        self.exchanging: bool | None = None
+        """A PROFIBUS slave exchanges data, or does not any more; None where it was not seen to."""
         self.reset_communication = False
         self.version = 0
 
@@ -101,5 +103,5 @@ class LiveNode:
 
 
 _KEPT: Final = tuple(name for name in LiveNode.__slots__ if name not in ("bus", "number", "memory", "version"))
-_ADDED: Final = frozenset({"answered_ns", "diagnosis"})
+_ADDED: Final = frozenset({"answered_ns", "diagnosis", "exchanging"})
 """Not in states of older recordings."""

@@ -13,7 +13,7 @@ from app.model.description_file import BUILTIN, load_builtin
 from app.model.od_export import description_dict
 from app.model.texts import LANGUAGES, load_texts
 
-DEVICES = ("oat-pmm", "oat-pmc", "nanotec-pd4e")
+DEVICES = ("oat-pmm", "oat-pmc", "nanotec-pd4e", "wandfluh-ed2")
 _OBJECT = re.compile(r"\b(?:[0-9A-F]{4}h|[0-9A-F]{4}:[0-9A-F]{2})\b")
 _HANDS_ON = re.compile(
     r"\b(check|measure|tighten|unplug|clean|replace|exchange)\b[^;:.]*"
@@ -44,7 +44,7 @@ def steps(language: str, error: ErrorCode) -> list[str]:
 
 
 def test_there_are_all_codes() -> None:
-    assert [len(errors_of(device)) for device in DEVICES] == [50, 25, 15], "3220h of the PMM comes from 4.2.2.2"
+    assert [len(errors_of(device)) for device in DEVICES] == [50, 25, 15, 22], "3220h of the PMM comes from 4.2.2.2"
 
 
 @pytest.mark.parametrize("language", LANGUAGES)

@@ -73,6 +73,7 @@ REFUSED_IN_REPLAY = {
     ("POST", "/api/live/restore/plan"),
     ("POST", "/api/live/restore"),
     ("POST", "/api/live/restores/{restore_id}/confirm"),
+    ("POST", "/api/live/restores/{restore_id}/unproven"),
     ("POST", "/api/live/restores/{restore_id}/roll-back"),
     ("POST", "/api/live/restores/{restore_id}/resume"),
     ("POST", "/api/instructor/faults"),

@@ -229,6 +229,7 @@ ROUTES: Final[dict[tuple[str, str], Role]] = {
     ("GET", "/api/live/restores"): VIEWER,
     ("GET", "/api/live/restores/{restore_id}"): VIEWER,
     ("POST", "/api/live/restores/{restore_id}/confirm"): TECHNICIAN,
+    ("POST", "/api/live/restores/{restore_id}/unproven"): TECHNICIAN,
     ("POST", "/api/live/restores/{restore_id}/roll-back"): TECHNICIAN,
     ("POST", "/api/live/restores/{restore_id}/resume"): TECHNICIAN,
     ("POST", "/api/live/restores/{restore_id}/give-up"): EXPERT,

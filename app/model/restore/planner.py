@@ -17,7 +17,7 @@ from app.model.datatypes import Raw
 from app.model.description import RestoreClass
 from app.model.restore.order import order
 from app.model.restore.plan import Need, Plan, PlanRow, Step, StepKind, Treatment
-from app.model.restore.rows import rows_of
+from app.model.restore.rows import breaks_saving, rows_of
 from app.model.restore.walk import MODE
 from app.model.restore.wanted import DeviceState, PlanOptions, Values
 from app.model.rules.all_rules import ALL
@@ -55,10 +55,13 @@ def make_plan(
     steps, unordered = order(station, writes, rules, options, states or {})
     findings = tuple(check_station(_after(station, writes), rules))
     after_restart = tuple(row.place for row in writes if _acts_at_start(station, row))
+    last = _last_steps(station, steps, options)
+    late = [step for step in steps if _too_early(station, step, last)]
+    saved = max((at for at, step in enumerate(last, 1) if step.kind is StepKind.SAVE), default=0)
     return Plan(
         station=station_slug(devices[0].slug) if devices else "",
         rows=rows,
-        steps=(*steps, *_last_steps(station, steps, options)),
+        steps=(*(step for step in steps if step not in late), *last[:saved], *late, *last[saved:]),
         needs=_needs(steps),
         restarts=tuple(dict.fromkeys(place.slug for place in after_restart)),
         findings=findings,
@@ -106,6 +109,15 @@ def _last_steps(station: StationValues, steps: Sequence[Step], options: PlanOpti
     ]
     last += [Step(StepKind.RESTART, slug) for slug in saved if options.restart]
     return last + [Step(StepKind.PROVE, slug) for slug in dict.fromkeys((*written, *saved))]
+
+
+def _too_early(station: StationValues, step: Step, last: Iterable[Step]) -> bool:
+    """True for a write after which its device takes no save any more, where it is to be saved: on a way back only."""
+    device = station.device(step.device)
+    if step.kind is not StepKind.WRITE or step.place is None or step.raw is None or device is None:
+        return False
+    saves = any(one.kind is StepKind.SAVE and one.device == step.device for one in last)
+    return saves and breaks_saving(device.description, step.place.address, step.raw)
 
 
 def _categories(station: StationValues, slug: str, steps: Sequence[Step], options: PlanOptions) -> tuple[Category, ...]:

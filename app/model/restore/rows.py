@@ -69,6 +69,11 @@ def _refusal(
         return Why.NEEDS_EXPERT, {}
     if entry.address not in device.values:
         return Why.UNREADABLE, {}
+    unmet = _unmet(device, entry, target)
+    if unmet is not None:
+        return Why.CONDITION, unmet
+    if not options.returning and breaks_saving(device.description, entry.address, target):
+        return Why.NOT_SAVABLE, {}
     if not options.returning and _irrevocable(device, entry, options):
         return Why.IRREVOCABLE, {}
     misfit = _misfit(device.description, entry, target, options)
@@ -80,6 +85,25 @@ def _refusal(
             return Why.LEFT_BY_FEATHER, {"source": source.short}
         return Why.NOT_SELECTED, {}
     return None, {}
+
+
+def breaks_saving(description: Description, address: Address, raw: Raw) -> bool:
+    """True where the device takes no command to save while the object holds ``raw``."""
+    commands = (description.entry(command.address) for command in description.save)
+    conditions = (condition for entry in commands for condition in entry.requires)
+    return any(condition.address == address and raw not in condition.values for condition in conditions)
+
+
+def _unmet(device: DeviceValues, entry: Entry, target: Raw) -> Mapping[str, str] | None:
+    """The precondition that nothing can fulfil: of a value that is kept and that only the device's making decides."""
+    for condition in entry.requires:
+        named = device.description.entries.get(condition.address)
+        found = device.values.get(condition.address)
+        fixed = named is not None and named.saved and not named.access.writable
+        if fixed and condition.concerns(target) and found is not None and found not in condition.values:
+            allowed_values = " / ".join(map(str, condition.values))
+            return {"needs": f"{condition.address.short} = {allowed_values}", "found": str(found)}
+    return None
 
 
 def _irrevocable(device: DeviceValues, entry: Entry, options: PlanOptions) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from decimal import Decimal
 from typing import Final
 
@@ -10,7 +10,7 @@ from app.errors import RefusedError
 from app.model.address import Address, parse_address
 from app.model.checks import check_write, limits_of
 from app.model.datatypes import Raw
-from app.model.description import Condition, Entry, LimitRef
+from app.model.description import Condition, Description, Entry, LimitRef
 from app.model.restore.plan import PlanRow, Step, StepKind
 from app.model.restore.rows import allowed
 from app.model.restore.wanted import PlanOptions
@@ -56,14 +56,26 @@ class Walk:
             return None
         return needed.values[0]
 
-    def gate_of(self, place: Place) -> tuple[Place, int] | None:
-        """The parameter that must hold a value while this one is written, and that value; as the count of a mapping."""
+    def gates_of(self, place: Place) -> Iterator[tuple[Place, int]]:
+        """The parameters that must hold a value while this one is written, and that value; as the count of a mapping.
+
+        The outer ones first, as the description names them.
+        """
         description = self._devices[place.slug].description
         for condition in self.entry(place).requires:
             gate = description.entries.get(condition.address)
-            if gate is not None and gate.address != MODE_SHOWN and gate.is_parameter and gate.access.writable:
-                return Place(place.slug, gate.address), condition.values[0]
-        return None
+            if condition.writing or gate is None or gate.address == MODE_SHOWN:
+                continue
+            if gate.is_parameter and gate.access.writable:
+                yield Place(place.slug, gate.address), condition.values[0]
+
+    def description(self, slug: str) -> Description:
+        """That of a device."""
+        return self._devices[slug].description
+
+    def values(self, slug: str) -> Mapping[Address, Raw]:
+        """What a device holds now."""
+        return self._values[slug]
 
     def value(self, place: Place) -> Raw | None:
         """What the object holds now."""
@@ -71,7 +83,7 @@ class Walk:
 
     def set_gate(self, place: Place, raw: Raw) -> None:
         """A step that writes a gate only so that others can be written, or puts it back."""
-        self._put(place, raw)
+        self._put_with_effects(place, raw)
         self.steps.append(Step(StepKind.AUXILIARY, place.slug, place, raw))
 
     def take_back_gate(self, place: Place, before: Raw) -> None:
@@ -98,13 +110,30 @@ class Walk:
 
     def write(self, row: PlanRow) -> None:
         """A step that writes a row."""
-        self._put(row.place, row.wanted)
+        self._put_with_effects(row.place, row.wanted)
         self.steps.append(Step(StepKind.WRITE, row.place.slug, row.place, row.wanted))
 
     def take_back(self, row: PlanRow) -> None:
         """Forgets the last step, which wrote this row."""
         self._put(row.place, row.now)
         self.steps.pop()
+
+    def effects(self, place: Place, raw: Raw) -> dict[Address, Raw]:
+        """What the device itself puts into other objects with a write."""
+        return {one.address: one.raw for one in self.entry(place).effects if raw in one.writing}
+
+    def takes(self, place: Place, raw: Raw, instead: Mapping[Address, Raw | None]) -> bool:
+        """True where the device would take ``raw`` while it holds ``instead`` in these objects; no rule is asked."""
+        values, entry = self._values[place.slug], self.entry(place)
+
+        def lookup(address: Address) -> Raw | None:
+            return instead[address] if address in instead else values.get(address)
+
+        try:
+            check_write(self.description(place.slug), entry, raw, lookup, allow=allowed(entry, self._options))
+        except RefusedError:
+            return False
+        return True
 
     def can_write(self, row: PlanRow) -> bool:
         """True where the device would take the row now, and neither a stepwise rule nor a limit is broken by it."""
@@ -167,6 +196,11 @@ class Walk:
         self._outside |= set(self._all_outside())
         for row in rows:
             self._put(row.place, row.now)
+
+    def _put_with_effects(self, place: Place, raw: Raw | None) -> None:
+        self._put(place, raw)
+        if raw is not None:
+            self._values[place.slug].update(self.effects(place, raw))
 
     def _put(self, place: Place, raw: Raw | None) -> None:
         assert raw is not None  # a row that is written has a present and a wanted value

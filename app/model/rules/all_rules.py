@@ -10,6 +10,7 @@ from app.model.rules import (
     charger,
     dc_link,
     encoder,
+    hydraulics,
     mains,
     mirrors,
     monitoring,
@@ -31,4 +32,5 @@ ALL: Final[tuple[Rule, ...]] = (
     *temperatures.RULES,
     *outputs.RULES,
     *mirrors.RULES,
+    *hydraulics.RULES,
 )

@@ -22,6 +22,7 @@ TEXT_KEYS: Final = frozenset(
     feather_sent foreign_written store_failed store_back
     settings_changed controller_order fault_set fault_seen fault_cleared faults_cleared fault_ended scenario_started
     scenario_stopped scenario_ended incident_made restore_begun restore_confirmed restore_turned_back restore_resumed
+    restore_unproven
     restore_done restore_rolled_back restore_incomplete restore_given_up nmt_sent lease_taken lease_ended
     motion_prepared motion_unwatched external_stop motion_lost motion_put_back motion_begun motion_ended motion_stopped
     fault_reset homed home_found pdo_changed pdo_put_back

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from app.service.connection import Connection
-from app.service.stop import CONTROLWORD
+from app.service.stop import machine_of
 
 Counts = Mapping[str, int]
 """How many commands each axis of a connection has got, by slug."""
@@ -13,4 +13,7 @@ Counts = Mapping[str, int]
 
 def commands_of(connection: Connection) -> Counts:
     """Those of now. All axes count, also those that a restore is not about: people stop the machine, not a device."""
-    return {axis.target.slug: axis.driver.commanded(axis.target.node, CONTROLWORD) for axis in connection.axes()}
+    return {
+        axis.target.slug: axis.driver.commanded(axis.target.node, machine_of(axis.target).controlword)
+        for axis in connection.axes()
+    }

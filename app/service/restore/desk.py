@@ -212,6 +212,17 @@ class Desk:
             kept, transaction, claim = await self._take_on(connection, restore_id, person, kind, commands)
             await self._run(kept, transaction, transaction.back(), person, claim)
 
+    async def go_on_unproven(self, restore_id: str, person: str) -> None:
+        """Nobody switches the device off and on now: the restore ends with what is saved, and not proven.
+
+        Raises RestoreStateError where that is not awaited, RestoreUnknownError.
+        """
+        transaction = self.at_work(restore_id)
+        slug = None if transaction is None else transaction.switching
+        if transaction is None or slug is None or not transaction.go_on_unproven():
+            raise self._wrong_state((await self.get(restore_id)).row)
+        self._journal.by(person).note(Kind.RESTORE_UNPROVEN, slug, station=self._open[restore_id].station)
+
     async def resume(self, connection: Connection | None, restore_id: str, person: str) -> None:
         """On to the new values. Raises RestoreUnknownError, RestoreStateError, UsageError, DeviceBusyError."""
         commands = None if connection is None else commands_of(connection)

@@ -62,13 +62,15 @@ class Order:
 class Timing:
     """How long is waited. ``ready_s``: for a device that starts or saves; ``quiet_s``: for an axis to stand still.
 
-    ``boot_s``: for the boot-up message after a restart that we ask for; ``mode_s``: for a mode of operation to show.
+    ``boot_s``: for the boot-up message after a restart that we ask for; ``hand_s``: for somebody who is to switch a
+    device off and on; ``mode_s``: for a mode of operation to show.
     ``status_s``: a statusword younger than this need not be read again.
     """
 
     ready_s: float = 20.0
     quiet_s: float = 30.0
     boot_s: float = 15.0
+    hand_s: float = 300.0
     mode_s: float = 2.0
     status_s: float = 0.5
 
@@ -96,6 +98,8 @@ class Objection(Enum):
     RESTORE_OPEN = "restore-open"
     RULES = "rules"
     NO_ORDER = "no-order"
+    CANNOT_SAVE = "cannot-save"
+    """In its state the device takes no save: what is written could not be kept."""
     NEW_ADDRESS = "new-address"
     """A restart would bring another address into force: the device could not be read again at the end."""
 

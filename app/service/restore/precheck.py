@@ -8,10 +8,12 @@ from typing import Final
 
 from app.errors import DeviceError, NoAnswerError
 from app.model.address import Address
+from app.model.axis_machine import StateMachine
 from app.model.datatypes import Raw
 from app.model.description import Description
-from app.model.restore.plan import Plan, StepKind
+from app.model.restore.plan import Plan, StepKind, Treatment
 from app.model.sets import Identity, ParameterSet
+from app.model.station import Place
 from app.model.values import quantity_of, to_scaled
 from app.model.variant import variant_of
 from app.recording.writer import RecorderState
@@ -20,7 +22,8 @@ from app.service.connection import Connection
 from app.service.devices import Target
 from app.service.gate import BARE_TURBINE
 from app.service.restore.order import Given, Objection, Order, Refusal
-from app.service.restore.survey import STATUSWORD, VELOCITY, Survey, is_driven, read_integer, stage_on
+from app.service.restore.survey import VELOCITY, Survey, is_driven, read_integer, stage_on
+from app.service.stop import machine_of
 
 MASTER_QUIET_NS: Final = 10_000_000_000
 """A master that was seen within so long is at work."""
@@ -54,6 +57,22 @@ def objections_to_plan(plan: Plan) -> Iterator[Refusal]:
             yield Refusal(Objection.NEW_ADDRESS, slug)
     if not any(step.kind is StepKind.WRITE for step in plan.steps) and not plan.unordered:
         yield Refusal(Objection.NOTHING_TO_DO)
+
+
+def objections_to_saving(plan: Plan, found: Survey) -> Iterator[Refusal]:
+    """Devices that would take no save at the end, such as one that is operated locally."""
+    wanted = {row.place: row.wanted for row in plan.rows if row.treatment is Treatment.WRITE}
+    for slug in dict.fromkeys(step.device for step in plan.steps if step.kind is StepKind.SAVE):
+        device = found.station.device(slug)
+        if device is None:
+            continue
+        saves = (device.description.entry(command.address) for command in device.description.save)
+        for condition in (one for entry in saves for one in entry.requires):
+            place = Place(slug, condition.address)
+            raw = wanted.get(place, found.station.raw(place))
+            if raw is not None and raw not in condition.values:
+                needs = f"{condition.address.short} = {' / '.join(map(str, condition.values))}"
+                yield Refusal(Objection.CANNOT_SAVE, slug, {"needs": needs, "found": str(raw)})
 
 
 def objections_to_sets(order: Order, found: Survey, nameplates: Mapping[str, str | None]) -> Iterator[Refusal]:
@@ -146,9 +165,9 @@ def objections_to_state(found: Survey) -> Iterator[Refusal]:
     """What speaks against writing these devices now."""
     for report in found.reports:
         slug, values = report.target.slug, report.values
-        status = values.get(STATUSWORD)
-        if STATUSWORD in report.target.description.entries:
-            yield from _objections_to_drive(report.target, values, status)
+        machine = report.target.description.machine
+        if machine is not None:
+            yield from _objections_to_drive(report.target, machine, values)
         main, supply = values.get(PMM_STATUS), values.get(SUPPLY_STATUS)
         entries = report.target.description.entries
         unknown = [a for a in (PMM_STATUS, SUPPLY_STATUS) if a in entries and not isinstance(values.get(a), int)]
@@ -158,10 +177,11 @@ def objections_to_state(found: Survey) -> Iterator[Refusal]:
             yield Refusal(Objection.SUPPLY, slug, {"status": f"{main:04X}h" if isinstance(main, int) else "–"})
 
 
-def _objections_to_drive(target: Target, values: Mapping[Address, Raw], status: Raw | None) -> Iterator[Refusal]:
+def _objections_to_drive(target: Target, machine: StateMachine, values: Mapping[Address, Raw]) -> Iterator[Refusal]:
+    status = values.get(machine.statusword)
     if not isinstance(status, int):
         yield Refusal(Objection.DRIVE_UNKNOWN, target.slug)
-    elif stage_on(status):
+    elif stage_on(machine, status):
         yield Refusal(Objection.DRIVE_ENABLED, target.slug, {"status": f"{status:04X}h"})
     speed = _scaled(target, VELOCITY, values)
     if speed is None and VELOCITY in target.description.entries and isinstance(status, int):
@@ -200,14 +220,15 @@ async def objections_to_nameless_axes(connection: Connection, targets: Iterable[
         return []
     known, found = {target.slug for target in targets}, []
     for axis in connection.axes():
+        machine = machine_of(axis.target)
         if axis.target.slug in known:
             continue
         try:
-            status = await read_integer(connection, axis.target, STATUSWORD)
+            status = await read_integer(connection, axis.target, machine.statusword)
         except NoAnswerError:
             found.append(Refusal(Objection.DRIVE_UNKNOWN, axis.target.slug))
         else:
-            if status is not None and is_driven(status):
+            if status is not None and is_driven(machine, status):
                 found.append(Refusal(Objection.DRIVE_ENABLED, axis.target.slug, {"status": f"{status:04X}h"}))
     return found
 
@@ -219,7 +240,7 @@ def _other_axes(connection: Connection, station: str) -> Iterable[Target]:
     return (
         target
         for target in connection.targets
-        if target.slug.rpartition("/")[0] in blades and STATUSWORD in target.description.entries
+        if target.slug.rpartition("/")[0] in blades and target.description.machine is not None
     )
 
 

@@ -34,6 +34,8 @@ class Prepared:
     hash: str
     commands: Counts
     """STOP and FEATHER that were sent before it was ordered."""
+    by_hand: tuple[str, ...] = ()
+    """Devices that a person has to switch off and on where they are to restart."""
 
     @property
     def goals(self) -> dict[Place, tuple[Raw, Raw]]:
@@ -79,11 +81,15 @@ async def prepare(
         *precheck.objections_to_state(found),
         *precheck.objections_to_surroundings(connection, connection.stamper()),
         *precheck.objections_to_plan(plan),
+        *precheck.objections_to_saving(plan, found),
         *await precheck.objections_to_nameless_axes(connection, targets),
     ]
+    by_hand = tuple(target.slug for target in targets if connection.driver(target).restarts_by_hand)
     if not (order.others_confirmed and order.expert):
         refusals += await precheck.objections_to_other_blades(connection, order.station)
-    return Prepared(order, targets, found, plan, same_unit, tuple(refusals), _hash(order, plan, found), commands)
+    return Prepared(
+        order, targets, found, plan, same_unit, tuple(refusals), _hash(order, plan, found), commands, by_hand
+    )
 
 
 def open_at(connection: Connection, targets: Iterable[Target], found: Survey) -> str | None:

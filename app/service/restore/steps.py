@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Coroutine, Iterable, Mapping
+from dataclasses import dataclass
 from typing import Any, Final
 
 from app.drivers.contract import LinkState
@@ -21,7 +22,7 @@ from app.errors import (
 from app.model.address import Address
 from app.model.checks import Allow
 from app.model.datatypes import Raw
-from app.model.description import RestoreClass
+from app.model.description import Description, RestoreClass
 from app.model.restore.plan import Step, StepKind
 from app.model.saving import Category, command_of, has_categories
 from app.model.station import Place, StationValues
@@ -34,7 +35,6 @@ from app.service.restore.log import RestoreLog, raw_text
 from app.service.restore.order import Broken, Cause, Objection, Timing
 from app.service.restore.precheck import objections_to_surroundings
 from app.service.restore.survey import (
-    STATUSWORD,
     VELOCITY,
     Survey,
     boots_of,
@@ -43,8 +43,8 @@ from app.service.restore.survey import (
     read_whole,
     standstill,
 )
-from app.service.save import restart, save
-from app.service.stop import CONTROLWORD, has_feather
+from app.service.save import Took, restart, save
+from app.service.stop import CONTROLWORD, has_feather, machine_of
 from app.service.whole import whole
 from app.service.write import write_raw
 from app.store.restore_rows import Direction, StepState
@@ -58,6 +58,15 @@ _ENABLE_OPERATION: Final = 1 << 3
 _FEATHER: Final = 1 << 11
 LOOK_S: Final = 0.05
 """How often is looked whether a device is ready, an axis stands, or a person has decided."""
+
+
+@dataclass(slots=True)
+class Switching:
+    """A device that somebody is to switch off and on. ``without``: a person wants to go on without that proof."""
+
+    slug: str
+    until_s: float
+    without: bool = False
 
 
 class Hands:
@@ -92,6 +101,7 @@ class Hands:
         self._reconnects = self._all_reconnects()
         self._commands = commands_of(connection) if commands is None else commands
         self.turned_back = False
+        self.switching: Switching | None = None
         known = set(targets)
         others = (axis.target for axis in connection.axes() if axis.target.slug not in known)
         bare = connection.turbine.slug == BARE_TURBINE
@@ -175,7 +185,8 @@ class Hands:
         for slug, count in commands_of(self.connection).items():
             if count != self._commands.get(slug):
                 target = self.connection.target(slug)
-                error = OvertakenError(bus=target.device.bus, node=target.node, address=CONTROLWORD.short)
+                controlword = machine_of(target).controlword
+                error = OvertakenError(bus=target.device.bus, node=target.node, address=controlword.short)
                 raise Broken(Cause.OVERTAKEN, slug, error)
 
     def _sure(self, direction: Direction) -> None:
@@ -192,20 +203,21 @@ class Hands:
             raise Broken(cause_of(error), target.slug, error) from error
 
     async def _is_driven(self, target: Target, fresh: bool = False) -> bool:
-        if STATUSWORD not in target.description.entries:
+        machine = target.description.machine
+        if machine is None:
             return False
-        view = target.live.value(target.device.bus, target.node, STATUSWORD)
+        view = target.live.value(target.device.bus, target.node, machine.statusword)
         young_ns = int(self.timing.status_s * 1e9)
         if not fresh and view is not None and view.reading is not None and not view.stale:
-            raw = target.lookup(STATUSWORD)
+            raw = target.lookup(machine.statusword)
             if view.reading.age_ns(self.connection.stamper()) < young_ns and isinstance(raw, int):
-                return is_driven(raw)
-        status = await self._integer(target, STATUSWORD)
-        return status is not None and is_driven(status)
+                return is_driven(machine, raw)
+        status = await self._integer(target, machine.statusword)
+        return status is not None and is_driven(machine, status)
 
     async def _answers(self, target: Target) -> None:
         """Wait until it does. One without a boot-up message tells by its uptime whether it has started anew."""
-        asked = UPTIME if UPTIME in target.description.entries else DEVICE_TYPE
+        asked = _sign_of_life(target.description)
         until = self.monotonic() + self.timing.ready_s
         while True:
             try:
@@ -251,6 +263,9 @@ class Hands:
             self._not_overtaken()
             raise Broken(cause_of(error), step.device, error) from error
         self.now = self.now.with_value(place, step.raw)
+        for effect in target.entry(place.address).effects:
+            if step.raw in effect.writing:
+                self.now = self.now.with_value(Place(place.slug, effect.address), effect.raw)
         read = None if done.read is None else raw_text(done.read)
         self._log.ended(StepState.DONE, read=read, how=done.how.value)
         self.look_for_restarts()
@@ -337,8 +352,11 @@ class Hands:
             return None
         return Place(target.slug, command_of(target.description.save, category).address)
 
-    async def restart(self, slug: str, direction: Direction) -> None:
-        """Restart the device, wait until it says that it is back, and for the first answer."""
+    async def restart(self, slug: str, direction: Direction) -> bool:
+        """Restart the device, wait until it says that it is back, and for the first answer.
+
+        False where a person was to switch it off and on and did not: then nothing is proven, and nothing is lost.
+        """
         target = self.targets[slug]
         await self._still()
         self.look_for_restarts()
@@ -346,16 +364,21 @@ class Hands:
         await self._not_feathered(slug)
         before = boots_of(target)
         driver, stamper = self.connection.driver(target), self.connection.stamper
+        by_hand = driver.restarts_by_hand
+        seconds = self.timing.hand_s if by_hand else self.timing.boot_s
+        restarting = restart(driver, target, self._journal, stamper, seconds, sure=lambda: self._sure(direction))
         try:
-            took = await whole(
-                restart(driver, target, self._journal, stamper, self.timing.boot_s, sure=lambda: self._sure(direction))
-            )
+            took = await (self._by_hand(target, restarting, direction) if by_hand else whole(restarting))
         except Broken:
             self._log.ended(StepState.FAILED)
             raise
         except HubsideError as error:
             self._log.ended(_state_after(error), error)
             raise Broken(cause_of(error), slug, error) from error
+        if took is None:
+            self._log.ended(StepState.FAILED, by_hand=True)
+            await self._answers(target)
+            return False
         await self._answers(target)
         known: dict[str, Any] = {"took_s": round(took.took_s, 3)}
         if took.proven is not None:
@@ -365,6 +388,30 @@ class Hands:
         if driver.ends_with_restart:
             bus = target.device.bus  # by the restart that we asked for
             self._reconnects[bus] = self.connection.buses[bus].status.reconnects
+        return True
+
+    async def _by_hand(
+        self, target: Target, restarting: Coroutine[Any, Any, Took], direction: Direction
+    ) -> Took | None:
+        """Wait until somebody has switched the device off and on; None where nobody does, or wants to go on without.
+
+        Nothing is sent meanwhile, so that a person may change his mind, and the tool may end, at any moment.
+        """
+        self.switching = Switching(target.slug, self.monotonic() + self.timing.hand_s)
+        task = asyncio.ensure_future(restarting)
+        try:
+            while not task.done():
+                if self.switching.without:
+                    return None
+                self._sure(direction)
+                await asyncio.wait([task], timeout=LOOK_S)
+            return task.result()
+        except NoAnswerError:
+            return None
+        finally:
+            self.switching = None
+            task.cancel()
+            await asyncio.gather(task, return_exceptions=True)
 
     async def prove(
         self, slug: str, goals: Mapping[Place, Raw], found: Survey, direction: Direction, restarted: bool
@@ -392,6 +439,14 @@ class Hands:
             raise
         self._log.ended(StepState.DONE, values=len(wanted) - len(hidden))
         return hidden
+
+
+def _sign_of_life(description: Description) -> Address:
+    """What a device is asked for to see whether it answers."""
+    for address in (UPTIME, DEVICE_TYPE):
+        if address in description.entries:
+            return address
+    return next(entry.address for entry in description if entry.access.readable)
 
 
 def _compare(cause: Cause, slug: str, wanted: Mapping[Address, Raw], found: Mapping[Address, Raw]) -> None:

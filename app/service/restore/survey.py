@@ -10,6 +10,7 @@ from typing import Final
 from app.drivers.contract import Driver
 from app.errors import HubsideError, NoAnswerError, UsageError
 from app.model.address import Address
+from app.model.axis_machine import CIA_402, StateMachine
 from app.model.axis_state import ENERGISED, FOLLOWING, AxisState
 from app.model.datatypes import Raw
 from app.model.description import Description
@@ -21,7 +22,6 @@ from app.service.backup import DeviceProgress, ReadReport, read_device, readable
 from app.service.connection import Connection
 from app.service.devices import Target
 
-STATUSWORD: Final = Address(0x6041)
 MODE_SHOWN: Final = Address(0x6061)
 VELOCITY: Final = Address(0x606C)
 STANDSTILL: Final = 10
@@ -106,21 +106,25 @@ async def read_whole(
 
 def state_of(report: ReadReport) -> DeviceState:
     """What the device does, as far as it has an axis."""
-    status, mode = report.values.get(STATUSWORD), report.values.get(MODE_SHOWN)
+    machine, mode = report.target.description.machine, report.values.get(MODE_SHOWN)
+    status = None if machine is None else report.values.get(machine.statusword)
     return DeviceState(
         mode=mode if isinstance(mode, int) else None,
-        enabled=stage_on(status) if isinstance(status, int) else None,
+        enabled=stage_on(machine, status) if machine is not None and isinstance(status, int) else None,
     )
 
 
-def stage_on(status: int) -> bool:
-    """True where a statusword says that the output stage is on."""
-    return AxisState.of(status) in ENERGISED
+def stage_on(machine: StateMachine, status: int) -> bool:
+    """True where a statusword says that the output stage is on, or that the loop is closed over a valve."""
+    if machine is CIA_402:
+        return AxisState.of(status) in ENERGISED
+    state = machine.state_of(status)
+    return state is None or state.powered  # a state that nobody knows is none to rely on
 
 
-def is_driven(status: int) -> bool:
+def is_driven(machine: StateMachine, status: int) -> bool:
     """True where a statusword says that the axis follows something: set-points, a quick stop, a fault reaction."""
-    return AxisState.of(status) in FOLLOWING
+    return AxisState.of(status) in FOLLOWING if machine is CIA_402 else stage_on(machine, status)
 
 
 def standstill(description: Description) -> int:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Awaitable, Mapping, Sequence
+from collections.abc import Awaitable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Final
@@ -90,6 +90,8 @@ class Transaction:
         self._back_commands: Counts | None = None
         self._deadline: float | None = None
         self._returning = False
+        self._restarted: set[str] = set()
+        """Devices that have restarted on the way that is gone now."""
         self._ordered = False
         """A person has taken it up after an interruption: whether the station is fit is not known."""
 
@@ -124,6 +126,26 @@ class Transaction:
         self._confirmed_by = person
         self._hands.decided()
         self._decided.set()
+        return True
+
+    @property
+    def switching(self) -> str | None:
+        """The device that somebody is to switch off and on now; None where none is."""
+        waiting = self._hands.switching
+        return None if waiting is None else waiting.slug
+
+    @property
+    def switch_left_s(self) -> float | None:
+        """Seconds until it goes on without that; None where it is not awaited."""
+        waiting = self._hands.switching
+        return None if waiting is None else max(0.0, waiting.until_s - self._hands.monotonic())
+
+    def go_on_unproven(self) -> bool:
+        """Nobody switches the device off and on: what was saved stays not proven. False where that is not awaited."""
+        waiting = self._hands.switching
+        if waiting is None:
+            return False
+        waiting.without = True
         return True
 
     def turn_back(self, person: str) -> None:
@@ -273,10 +295,11 @@ class Transaction:
         goals = self._terms.wanted(direction)
         self.done, self.total = 0, len(steps)
         checked = restarting = False
-        for step in steps:
+        for number, step in enumerate(steps):
             self._look_for_people(direction)
             if step.kind is StepKind.SAVE and not checked:
-                await self._hands.check(goals)
+                later = self._changed_by(steps[number:])
+                await self._hands.check({place: raw for place, raw in goals.items() if place not in later})
                 checked = True
             if step.kind is StepKind.RESTART and not restarting:
                 await self._hands.guard(
@@ -287,7 +310,7 @@ class Transaction:
             await self._do(step, direction, confirm_s)
             self.done += 1
         saved = {step.device for step in steps if step.kind is StepKind.SAVE}
-        restarted = {step.device for step in steps if step.kind is StepKind.RESTART}
+        restarted = self._restarted
         unproven = await self._prove(bool(restarted), goals, direction)
         self._look_for_people(direction)
         proven = bool(saved) and saved <= restarted and not unproven
@@ -300,6 +323,16 @@ class Transaction:
         await self._log.enter(RestoreState.ROLLED_BACK if back else RestoreState.DONE, proven=proven, unproven=unproven)
         return End.OLD if back else End.NEW
 
+    def _changed_by(self, steps: Iterable[Step]) -> frozenset[Place]:
+        """What the steps write, and what the device changes by itself with that."""
+        written = [step.place for step in steps if step.place is not None]
+        effects = (
+            Place(place.slug, effect.address)
+            for place in written
+            for effect in self.descriptions[place.slug].entry(place.address).effects
+        )
+        return frozenset((*written, *effects))
+
     async def _do(self, step: Step, direction: Direction, confirm_s: float | None) -> None:
         if step.kind in (StepKind.WRITE, StepKind.AUXILIARY):
             await self._hands.write(step, direction)
@@ -307,8 +340,8 @@ class Transaction:
             await self._confirm(direction, confirm_s)
         elif step.kind is StepKind.SAVE:
             await self._hands.save(step.device, direction, step.category)
-        elif step.kind is StepKind.RESTART:
-            await self._hands.restart(step.device, direction)
+        elif step.kind is StepKind.RESTART and await self._hands.restart(step.device, direction):
+            self._restarted.add(step.device)
 
     async def _enter_for(self, step: Step, direction: Direction) -> None:
         """The state that the step belongs to."""

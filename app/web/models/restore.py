@@ -13,7 +13,7 @@ from app.web.models.visits import Remark, WorkOrder
 Slug = Annotated[str, Field(max_length=200)]
 StepKindName = Literal["write", "auxiliary", "confirm", "save", "restart", "prove"]
 EndName = Literal["new", "old", "incomplete", "given-up"]
-WayName = Literal["confirm", "roll-back", "resume", "give-up"]
+WayName = Literal["confirm", "roll-back", "resume", "unproven", "give-up"]
 StateName = Literal[
     "writing",
     "awaiting-confirmation",
@@ -150,7 +150,7 @@ class RestorePlanDoc(BaseModel):
     """A plan. It can be begun where nothing is refused; ``hash`` names all that a person agrees to.
 
     ``findings``: what the rules say of the station as it will be; ``blockers``: those of them that forbid it;
-    ``mended``: what is broken now and will not be any more.
+    ``mended``: what is broken now and will not be any more. ``by_hand``: devices without a restart command.
     """
 
     station: str
@@ -160,6 +160,7 @@ class RestorePlanDoc(BaseModel):
     rows: list[RestorePlanRow]
     steps: list[RestorePlanStep]
     needs: dict[str, list[Literal["axis-disabled", "homing-mode"]]]
+    by_hand: list[str]
     restarts: list[str]
     findings: list[RestoreFinding]
     blockers: list[RestoreFinding]
@@ -219,12 +220,15 @@ class RestoreDoc(RestoreHead):
     """A restore with all its values and steps.
 
     ``left_s``: how long the person still has to confirm; null where that is not awaited. ``proven``: by a restart;
-    where it is false at the end, the values are saved and not yet proven by one. ``done`` of ``total`` steps of the
+    where it is false at the end, the values are saved and not yet proven by one. ``switching``: the device that
+    somebody is to switch off and on now, for ``switch_left_s`` seconds at most. ``done`` of ``total`` steps of the
     way that runs. ``blocks``: writes, saves and restarts of the station are refused. ``can``: what a person may order.
     """
 
     running: bool
     left_s: float | None
+    switching: str | None
+    switch_left_s: float | None
     confirm_s: float | None
     confirmed_by: str | None
     proven: bool

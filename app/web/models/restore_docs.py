@@ -72,6 +72,7 @@ def plan_doc(prepared: Prepared) -> RestorePlanDoc:
         rows=[_row(row, station) for row in plan.rows],
         steps=[_step(step, station) for step in plan.steps],
         needs={slug: [need.value for need in needs] for slug, needs in plan.needs.items()},
+        by_hand=list(prepared.by_hand),
         restarts=list(plan.restarts),
         findings=[_finding(one, broken) for one in plan.findings],
         blockers=[_finding(one, broken) for one in plan.blockers],
@@ -190,6 +191,8 @@ def restore_doc(kept: Kept, desk: Desk, descriptions: Descriptions) -> RestoreDo
         **_head(kept.row, outcome),
         running=transaction is not None,
         left_s=None if transaction is None else transaction.left_s,
+        switching=None if transaction is None else transaction.switching,
+        switch_left_s=None if transaction is None else transaction.switch_left_s,
         confirm_s=details["confirm_s"],
         confirmed_by=outcome.get("confirmed_by"),
         proven=bool(outcome.get("proven")),
@@ -212,6 +215,10 @@ def _can(state: RestoreState, transaction: Transaction | None) -> list[WayName]:
         return ["resume", "roll-back", "give-up"] if state is RestoreState.INCOMPLETE else []
     if state is RestoreState.AWAITING_CONFIRMATION:
         return ["confirm", "roll-back"]
+    if transaction.switching is not None and state is not RestoreState.ROLLING_BACK:
+        return ["unproven", "roll-back"]
+    if transaction.switching is not None:
+        return ["unproven"]
     on_its_way = not state.ended and state not in (RestoreState.ROLLING_BACK, RestoreState.INCOMPLETE)
     return ["roll-back"] if on_its_way else []
 

@@ -99,6 +99,13 @@ async def resume_restore(bench: BenchOf, person: PersonOf, restore_id: str, _req
     return await _doc(bench, restore_id)
 
 
+@router.post("/live/restores/{restore_id}/unproven", dependencies=[needs(Role.TECHNICIAN)])
+async def go_on_unproven(bench: BenchOf, person: PersonOf, restore_id: str, _request: Nothing) -> RestoreDoc:
+    """Do without the proof of a restart: nobody switches the device off and on now."""
+    await bench.restores.go_on_unproven(restore_id, person.person)
+    return await _doc(bench, restore_id)
+
+
 @router.post("/live/restores/{restore_id}/give-up", dependencies=[needs(Role.EXPERT)])
 async def give_up_restore(bench: BenchOf, person: PersonOf, restore_id: str, request: GiveUpRequest) -> RestoreDoc:
     """Close one that can be neither resumed nor rolled back; its station takes writes again, as it is."""

@@ -1940,6 +1940,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/live/restores/{restore_id}/unproven": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Go On Unproven
+         * @description Do without the proof of a restart: nobody switches the device off and on now.
+         */
+        post: operations["go_on_unproven"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/live/scope": {
         parameters: {
             query?: never;
@@ -8899,14 +8919,15 @@ export interface components {
          * @description A restore with all its values and steps.
          *
          *     ``left_s``: how long the person still has to confirm; null where that is not awaited. ``proven``: by a restart;
-         *     where it is false at the end, the values are saved and not yet proven by one. ``done`` of ``total`` steps of the
+         *     where it is false at the end, the values are saved and not yet proven by one. ``switching``: the device that
+         *     somebody is to switch off and on now, for ``switch_left_s`` seconds at most. ``done`` of ``total`` steps of the
          *     way that runs. ``blocks``: writes, saves and restarts of the station are refused. ``can``: what a person may order.
          */
         RestoreDoc: {
             /** Blocks */
             blocks: boolean;
             /** Can */
-            can: ("confirm" | "roll-back" | "resume" | "give-up")[];
+            can: ("confirm" | "roll-back" | "resume" | "unproven" | "give-up")[];
             /** Cause Details */
             cause_details: {
                 [key: string]: string;
@@ -8951,6 +8972,10 @@ export interface components {
             station: string;
             /** Steps */
             steps: components["schemas"]["RestoreStepDoc"][];
+            /** Switch Left S */
+            switch_left_s: number | null;
+            /** Switching */
+            switching: string | null;
             /** Total */
             total: number;
             /** Turbine */
@@ -9038,11 +9063,13 @@ export interface components {
          * @description A plan. It can be begun where nothing is refused; ``hash`` names all that a person agrees to.
          *
          *     ``findings``: what the rules say of the station as it will be; ``blockers``: those of them that forbid it;
-         *     ``mended``: what is broken now and will not be any more.
+         *     ``mended``: what is broken now and will not be any more. ``by_hand``: devices without a restart command.
          */
         RestorePlanDoc: {
             /** Blockers */
             blockers: components["schemas"]["RestoreFinding"][];
+            /** By Hand */
+            by_hand: string[];
             /** Findings */
             findings: components["schemas"]["RestoreFinding"][];
             /** Hash */
@@ -20274,6 +20301,78 @@ export interface operations {
         };
     };
     roll_back_restore: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                restore_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /** @example {} */
+                "application/json": components["schemas"]["Nothing"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["RestoreDoc"];
+                };
+            };
+            /** @description Unauthorized */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Forbidden */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not Found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Unprocessable Entity */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Anything else that went wrong */
+            default: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    go_on_unproven: {
         parameters: {
             query?: never;
             header?: never;

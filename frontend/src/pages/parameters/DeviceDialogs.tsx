@@ -35,7 +35,7 @@ export function SaveDialog({ doc, onClose }: Props) {
       tone="accent"
       run={(slug) => commands.save(slug, category)}
       onClose={onClose}
-      still={categories.length > 0}
+      manner={categories.length > 0 ? "still" : "command"}
       warning={
         <>
           {categories.length > 0 && (
@@ -60,7 +60,7 @@ export function RestartDialog({ doc, onClose }: Props) {
       tone="danger"
       run={commands.restart}
       onClose={onClose}
-      still={doc.bus !== "canopen"}
+      manner={doc.bus === "profibus-dp" ? "hand" : doc.bus === "canopen" ? "command" : "still"}
       warning={<UnsavedList entries={doc.entries} name="restart" />}
     />
   );
@@ -70,14 +70,14 @@ interface CommandProps {
   name: "save" | "restart";
   tone: "accent" | "danger";
   run: (slug: string) => Promise<{ took_s: number; proven?: boolean | null }>;
-  /** The device does it at standstill only, and by itself: no NMT, no safety chain. */
-  still: boolean;
+  /** Still: at standstill only, and by itself, with no NMT and no safety chain. Hand: a person switches it off and on. */
+  manner: "command" | "still" | "hand";
   warning: ReactNode;
   onClose: () => void;
 }
 
 /** Says what will happen to which device, and acts only on a held button. */
-function CommandDialog({ name, tone, run, still, warning, onClose }: CommandProps) {
+function CommandDialog({ name, tone, run, manner, warning, onClose }: CommandProps) {
   const t = useTexts();
   const { slug } = useDevice();
   const device = useDeviceName()(slug);
@@ -86,12 +86,12 @@ function CommandDialog({ name, tone, run, still, warning, onClose }: CommandProp
   return (
     <Dialog opened onClose={onClose} title={<Text fw={700}>{t(key("title"), { device })}</Text>} size="lg">
       <Stack gap="md">
-        <Text>{t(key(still ? "explain_still" : "explain"), { device })}</Text>
+        <Text>{t(key(manner === "command" ? "explain" : `explain_${manner}`), { device })}</Text>
         {command.isIdle && warning}
         {command.isPending && (
           <Group role="status">
             <Loader size="sm" aria-hidden />
-            {t(key("running"), { device })}
+            {t(key(manner === "hand" ? "running_hand" : "running"), { device })}
           </Group>
         )}
         {command.isSuccess && (

@@ -78,7 +78,7 @@ export function Launch({ planned, order, station, terms, onTerms, confirmMin, on
         data-testid="restore-reason"
       />
       <Checkbox
-        label={t("page.restoring.restart")}
+        label={t(`page.restoring.restart${plan?.by_hand.length ? "_hand" : ""}`)}
         checked={terms.restart}
         onChange={(event) => onTerms({ ...terms, restart: event.currentTarget.checked })}
         data-testid="restore-restart"

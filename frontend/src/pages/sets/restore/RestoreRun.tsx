@@ -12,6 +12,8 @@ import { type RestoreDoc, restoreQuery } from "../../../api/restore";
 import { NeedsRole } from "../../../frame/NeedsRole";
 import { usePageSearch } from "../../../frame/search";
 import { useTexts } from "../../../texts/texts";
+import { useDeviceName } from "../../../ui/devices";
+import { HoldButton } from "../../../ui/HoldButton";
 import { ProblemAlert } from "../../../ui/ProblemAlert";
 import { Ended } from "./Ended";
 import { useStationName } from "./names";
@@ -47,6 +49,7 @@ export function RestoreRun({ id }: { id: string }) {
     <div className={classes.room} data-testid="restore-run" data-state={doc.state}>
       {doc.end === null ? <Running doc={doc} /> : <Ended doc={doc} />}
       {doc.state === "awaiting-confirmation" && <Confirmation doc={doc} />}
+      {doc.switching !== null && <Switching doc={doc} device={doc.switching} />}
       <RunValues doc={doc} />
     </div>
   );
@@ -143,6 +146,37 @@ function Confirmation({ doc }: { doc: RestoreDoc }) {
         label={t("page.restoring.confirm.button")}
         disabled={!doc.can.includes("confirm")}
       />
+    </div>
+  );
+}
+
+/** A device without a restart command: a person switches it off and on, or does without that proof. */
+function Switching({ doc, device }: { doc: RestoreDoc; device: string }) {
+  const t = useTexts();
+  const name = useDeviceName()(device);
+  const way = useWay(doc);
+  return (
+    <div className={classes.confirm} role="alert" data-testid="restore-switch">
+      <span className={classes.countdown} data-testid="switch-left" role="timer">
+        {minutesOf(doc.switch_left_s ?? 0)}
+      </span>
+      <div>
+        <strong>{t("page.restoring.switch.title", { device: name })}</strong>
+        <div>{t("page.restoring.switch.explain")}</div>
+      </div>
+      <NeedsRole role="technician" device>
+        {(locked) => (
+          <HoldButton
+            tone="accent"
+            hint={t("page.hold")}
+            disabled={locked || way.isPending || !doc.can.includes("unproven")}
+            onHeld={() => way.mutate("unproven")}
+            testId="unproven-hold"
+          >
+            {t("page.restoring.switch.without")}
+          </HoldButton>
+        )}
+      </NeedsRole>
     </div>
   );
 }

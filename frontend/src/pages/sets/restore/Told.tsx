@@ -126,6 +126,7 @@ function WhatHappens({ plan, station, confirmMin, terms }: Props) {
   const saves = plan.steps.filter((step) => step.kind === "save");
   const parts = saves.filter((step) => step.category !== null);
   const homed = Object.keys(plan.needs);
+  const byHand = saves.some((step) => plan.by_hand.includes(step.device));
   if (writes.size === 0) return null;
   const devices = [...new Set(saves.map((step) => nameOf(step.device)))].join(t("page.restoring.and"));
   return (
@@ -155,8 +156,9 @@ function WhatHappens({ plan, station, confirmMin, terms }: Props) {
         </li>
         {terms.restart && (
           <li>
-            {t("page.restoring.happens.restart", { devices })}
-            {parts.length === 0 && (
+            {t(`page.restoring.happens.restart${byHand ? "_hand" : ""}`, { devices })}
+            {byHand && <small className="tone-warning">{t("page.restoring.happens.restart_hand_why")}</small>}
+            {parts.length === 0 && !byHand && (
               <small className="tone-warning">{t("page.restoring.happens.restart_chain")}</small>
             )}
           </li>

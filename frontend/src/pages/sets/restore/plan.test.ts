@@ -49,6 +49,7 @@ const plan = (rows: PlanRow[], more: Partial<PlanDoc> = {}): PlanDoc => ({
   rows,
   steps: [],
   needs: {},
+  by_hand: [],
   restarts: [],
   findings: [],
   blockers: [],
