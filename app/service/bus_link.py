@@ -17,6 +17,7 @@ from app.service.options import Options
 from app.wire.frame import Can, Frame, Stamper
 from app.wire.live import LiveState
 from app.wire.nmt import NmtState
+from app.wire.profibus.order_proof import read_order
 from app.wire.records import Record, Source
 
 
@@ -52,7 +53,12 @@ class BusLink(BusFeed):
         servers = None
         if self.kind is Bus.MODBUS_TCP:
             servers = {node: server.text for node, server in turbine.servers(config.name).items()}
-        super().__init__(config.name, bitrate_of(config), descriptions, live, lock, servers)
+        orders = {
+            device.node: read_order(device.slave.pzd_order)
+            for device in turbine.devices
+            if device.bus == config.name and device.slave.pzd_order
+        }
+        super().__init__(config.name, bitrate_of(config), descriptions, live, lock, servers, config.kind, orders)
         self.adapter = config.connection
         self.sink: FrameSink | None = None
         self.foreign: ForeignWrites | None = None

@@ -198,6 +198,7 @@ class Connection:
                 for bus in self.turbine.buses
                 for node, server in self.turbine.servers(bus.name).items()
             },
+            orders={f"{d.bus}/{d.node}": d.slave.pzd_order for d in self.turbine.devices if d.slave.pzd_order},
             protocols={bus.name: bus.kind.value for bus in self.turbine.buses if bus.kind is Bus.PROFIBUS_DP},
             nodes={f"{t.device.bus}/{t.node}": f"{t.slug} {t.description.id}" for t in self._targets.values()},
             descriptions={t.description.id: t.description for t in self._targets.values()}.values(),
