@@ -12,9 +12,9 @@ from app.model.address import Address
 from app.model.axis_state import AxisState
 from app.service.connection import Connection
 from app.service.motion.brake_test import OUTPUTS, BrakeVerdict, try_brake
+from app.service.motion.control import cia402
 from app.service.motion.desk import MotionDesk
 from app.service.motion.feathering import feather
-from app.service.motion.control import cia402
 from app.service.motion.moves import hold, home, jog, move_to, reset_fault
 from app.service.motion.running import Ended
 from app.service.stop import Command, command_all
