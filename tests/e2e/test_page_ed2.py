@@ -11,6 +11,7 @@ import pytest
 from playwright.sync_api import Browser, BrowserContext, expect
 
 from app.twins.ed2.states import State
+from app.wire.profibus.telegrams import CONTROL_WORD
 from tests.e2e.browser import SIZE
 from tests.e2e.processes import running
 from tests.e2e.test_page_motion import press
@@ -97,4 +98,4 @@ def test_cylinders_are_prepared_driven_by_hand_moved_and_stopped(
     page.keyboard.press("Escape")
     expect(diagram).to_have_attribute("data-state", "init", timeout=MOVE_MS)
     page.mouse.up()
-    assert bench.state is State.INIT
+    assert bench.wired.received[CONTROL_WORD] == 0

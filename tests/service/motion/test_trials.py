@@ -225,7 +225,7 @@ async def test_an_axis_with_power_is_not_homed(connection: Connection, served: S
     async with at_the_desk(connection) as (desk, page):
         await prepared(desk, page)
         machine = served.turbine.blades[0].pmc.machine
-        control = desk.prepared[AXIS].control
+        control = cia402(desk.prepared[AXIS].control)
         control.own()
         await control.enable()
         assert machine.state.name == "OPERATION_ENABLED"

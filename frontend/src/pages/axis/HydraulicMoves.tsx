@@ -82,12 +82,14 @@ export function HydraulicMoves({ station, device, context }: Props) {
           value={rapid ? "rapid" : "creep"}
           onChange={(value) => setRapid(value === "rapid")}
           data={[
-            { value: "creep", label: `${t("page.hydraulic.creep")} ${pace(CREEP_SPEED)}` },
-            { value: "rapid", label: `${t("page.hydraulic.rapid")} ${pace(RAPID_SPEED)}` },
+            { value: "creep", label: t("page.hydraulic.creep") },
+            { value: "rapid", label: t("page.hydraulic.rapid") },
           ]}
           aria-label={t("page.hydraulic.speed_way")}
           data-testid="manual-speed"
           size="md"
+          fullWidth
+          mb={8}
         />
         <div className={`${motion.row} ${motion.runs}`}>
           <RunButton
@@ -97,7 +99,7 @@ export function HydraulicMoves({ station, device, context }: Props) {
             onPress={() => hold(Way.Minus, (one) => moving.manual(device, one, false, rapid))}
             testId="manual-minus"
           >
-            ◀ {t(rapid ? "page.hydraulic.rapid" : "page.hydraulic.creep")}
+            ◀ {pace(rapid ? RAPID_SPEED : CREEP_SPEED)}
           </RunButton>
           <RunButton
             hint={t("page.hydraulic.positive")}
@@ -106,7 +108,7 @@ export function HydraulicMoves({ station, device, context }: Props) {
             onPress={() => hold(Way.Plus, (one) => moving.manual(device, one, true, rapid))}
             testId="manual-plus"
           >
-            {t(rapid ? "page.hydraulic.rapid" : "page.hydraulic.creep")} ▶
+            {pace(rapid ? RAPID_SPEED : CREEP_SPEED)} ▶
           </RunButton>
           <RunButton
             hint={t("page.motion.hold_hint")}

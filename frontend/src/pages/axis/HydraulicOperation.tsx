@@ -40,6 +40,7 @@ export function HydraulicOperation({ device, context }: { device: string; contex
         aria-label={t("page.hydraulic.operation")}
         data-testid="axis-operation"
         size="md"
+        fullWidth
       />
       {!single && (
         <Checkbox

@@ -8,8 +8,8 @@ import { RunButton } from "../../motion/RunButton";
 import { useOrder } from "../../motion/useOrder";
 import { useTexts } from "../../texts/texts";
 
-/** The drive is told to watch us, and proves that it stops without us; afterwards its old settings come back. */
-export function PrepareSection({ device }: { device: string }) {
+/** The drive is told to watch us, and proves that it stops without us; afterwards its old settings come back. `words`: table of texts. */
+export function PrepareSection({ device, words = "page.motion" }: { device: string; words?: string }) {
   const t = useTexts();
   const { motion: line, state } = useControl();
   const order = useOrder();
@@ -24,7 +24,7 @@ export function PrepareSection({ device }: { device: string }) {
       {left && <p className="tone-warning">{t("page.motion.left")}</p>}
       {unwatched ? (
         <p className={prepared ? "tone-warning" : undefined}>
-          {t(prepared ? "page.motion.unwatched_ready" : "page.motion.unwatched_not_yet")}
+          {t(`${words}.${prepared ? "unwatched_ready" : "unwatched_not_yet"}`)}
         </p>
       ) : (
         <p>
