@@ -172,6 +172,7 @@ def _open_pty(path: str) -> int:
     file = os.open(path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
     try:
         tty.setraw(file, termios.TCSANOW)
+        termios.tcflush(file, termios.TCIFLUSH)  # an answer to whoever was killed here before us is for nobody now
     except BaseException:
         os.close(file)
         raise

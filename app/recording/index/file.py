@@ -8,11 +8,12 @@ from __future__ import annotations
 import errno
 import os
 import sqlite3
+import sys
 import zlib
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any, Final
+from typing import IO, Any, Final
 from uuid import uuid4
 
 from app.errors import RecordingError
@@ -43,6 +44,9 @@ CREATE INDEX signs_at ON signs (t_ns);
 CREATE UNIQUE INDEX pages_of ON pages (signal, level, number);
 CREATE UNIQUE INDEX load_of ON load (bus, number);
 """
+_TRIES: Final = 5
+_RENAMES_OPEN: Final = sys.platform != "win32"
+"""Whether a file that is open can be renamed and removed."""
 
 
 class IndexWriter:
@@ -54,12 +58,10 @@ class IndexWriter:
 
     def __init__(self, place: Path) -> None:
         self._place = place
-        self.part = place.with_name(f"{place.name}.{uuid4().hex[:12]}{PART_SUFFIX}")
         with _translated(place):
             place.parent.mkdir(parents=True, exist_ok=True)
             _sweep(place)
-            self._lock = self.part.open("xb")
-            lock_file(self._lock)
+            self.part, self._lock = _part_of(place)
             self._database = sqlite3.connect(self.part, isolation_level=None)
             self._database.executescript("PRAGMA journal_mode=OFF; PRAGMA synchronous=OFF; PRAGMA page_size=8192;")
             self._database.executescript(_TABLES)
@@ -92,8 +94,10 @@ class IndexWriter:
             self._database.executescript(_INDEXES)
             self._database.close()
             _seal(self.part)
-            self._lock.close()  # an open file cannot be renamed everywhere
-            self.part.replace(self._place)
+            if not _RENAMES_OPEN:
+                self._lock.close()
+            self.part.replace(self._place)  # still locked where it can be: else who sweeps just now takes it away
+            self._lock.close()
 
 
 @contextmanager
@@ -112,7 +116,25 @@ def _sweep(place: Path) -> None:
         with suppress(OSError):
             with left.open("r+b") as file:
                 lock_file(file)
-            left.unlink()
+                if _RENAMES_OPEN:
+                    left.unlink()
+            left.unlink(missing_ok=True)
+
+
+def _part_of(place: Path) -> tuple[Path, IO[bytes]]:
+    """A new file that is locked. Who sweeps between its making and its lock may have it: then another one is made."""
+    for left in reversed(range(_TRIES)):
+        part = place.with_name(f"{place.name}.{uuid4().hex[:12]}{PART_SUFFIX}")
+        file = part.open("xb")
+        try:
+            lock_file(file)
+            if part.exists() or not left:
+                return part, file
+        except OSError:
+            if not left:
+                raise
+        file.close()
+    raise AssertionError  # the last try gives or raises
 
 
 def _within(one: Any) -> Any:

@@ -152,11 +152,16 @@ describe("a value that changes", () => {
   });
 });
 
+const NO_RULES = { enumeration_from: null, bits_from: null, limits_from: null };
+
 const DOC = {
   entries: [
     { address: "6064", title: "position", scale: 0.01, unit: "°", decimals: 1, unit_from: null },
     { address: "606C", title: "velocity", scale: 1, unit: "°/s", decimals: 0, unit_from: null },
-  ].map((one) => ({ enumeration: null, bits: null, hexadecimal: false, ...one }) as unknown as EntryDoc),
+  ].map(
+    (one) =>
+      ({ enumeration: null, bits: null, hexadecimal: false, ...NO_RULES, ...one }) as unknown as EntryDoc,
+  ),
   variant_matches: [],
   bit_tables: {},
   enumerations: {},

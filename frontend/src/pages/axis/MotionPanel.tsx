@@ -55,7 +55,7 @@ export function MotionPanel({ station, device, context }: Props) {
       <div className={motion.panel}>
         <ControlSection device={device.slug} />
         <Interlocks device={device.slug} title={words("interlocks")} />
-        <PrepareSection device={device.slug} words={hydraulic ? "page.hydraulic" : "page.motion"} />
+        <PrepareSection device={device.slug} of={hydraulic ? "hydraulic" : "motion"} />
         {hydraulic ? (
           <>
             <HydraulicMoves station={station} device={device.slug} context={context} />

@@ -8,8 +8,8 @@ import { RunButton } from "../../motion/RunButton";
 import { useOrder } from "../../motion/useOrder";
 import { useTexts } from "../../texts/texts";
 
-/** The drive is told to watch us, and proves that it stops without us; afterwards its old settings come back. `words`: table of texts. */
-export function PrepareSection({ device, words = "page.motion" }: { device: string; words?: string }) {
+/** The drive is told to watch us, and proves that it stops without us; afterwards its old settings come back. `of`: whose texts. */
+export function PrepareSection({ device, of = "motion" }: { device: string; of?: "motion" | "hydraulic" }) {
   const t = useTexts();
   const { motion: line, state } = useControl();
   const order = useOrder();
@@ -24,7 +24,7 @@ export function PrepareSection({ device, words = "page.motion" }: { device: stri
       {left && <p className="tone-warning">{t("page.motion.left")}</p>}
       {unwatched ? (
         <p className={prepared ? "tone-warning" : undefined}>
-          {t(`${words}.${prepared ? "unwatched_ready" : "unwatched_not_yet"}`)}
+          {t(`page.${of}.${prepared ? "unwatched_ready" : "unwatched_not_yet"}`)}
         </p>
       ) : (
         <p>
