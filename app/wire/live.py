@@ -68,7 +68,7 @@ HEARTBEAT_PRODUCER: Final = Address(0x1017)
 SILENT_FACTOR: Final = 1.5
 """A node is silent after so many heartbeat periods."""
 SILENT_MARGIN_NS: Final = 100_000_000
-_WITHOUT_HEARTBEATS: Final = (Protocol.OBJECT, Protocol.FRAMES, Protocol.REGISTERS)
+_WITHOUT_HEARTBEATS: Final = (Protocol.OBJECT, Protocol.FRAMES, Protocol.REGISTERS, Protocol.PKW)
 """What is spoken where only an answer tells that a device is there."""
 SNAPSHOT_VERSION: Final = 1
 _SNAPSHOT_EVENTS: Final = 200
@@ -283,6 +283,8 @@ class LiveState:
         if source is Source.PDO_TX or source is Source.EMCY:
             memory.sent(cell, reading)
             self._touch_cell(cell)
+            if node.exchanging:
+                node.answered_ns = t_ns
         elif source is Source.SDO_READ:
             if memory.read(cell, reading):
                 self._tell(node, t_ns, EventKind.STORED_DIFFERS, Severity.WARNING, address=address.short)

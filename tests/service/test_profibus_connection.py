@@ -20,6 +20,7 @@ from app.service.bus_driver import make_driver
 from app.service.connection import Connection
 from app.service.journal import Kind
 from app.service.options import Options
+from app.service.views import node_lines
 from app.service.write import write_text
 from app.wire.frame import Direction, Fdl
 from app.wire.profibus.pzd import First, Order
@@ -47,6 +48,17 @@ async def test_what_is_read_is_seen_live_and_every_telegram_is_recorded(tmp_path
         assert recording.info.bit_rates == {BUS: line.baud}
     assert {type(frame.payload) for frame in frames} == {Fdl}
     assert {frame.direction for frame in frames} == {Direction.RX, Direction.TX}
+
+
+async def test_a_station_that_answers_is_heard() -> None:
+    with wire() as line:
+        async with connected(line) as connection:
+            target = connection.target(CYLINDERS)
+            begun_ns = connection.stamper()
+            await connection.driver(target).read(target.node, RAMP_VELOCITY)
+            (shown,) = node_lines(connection.targets, connection.live)
+            assert not shown.managed and not shown.silent, "there are no heartbeats on this bus"
+            assert shown.answered_t_ns is not None and shown.answered_t_ns > begun_ns
 
 
 async def test_a_write_is_checked_done_and_noted() -> None:
