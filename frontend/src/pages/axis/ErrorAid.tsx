@@ -2,7 +2,7 @@ import { Link } from "@tanstack/react-router";
 import { type PageSearch, roomSearch } from "../../frame/search";
 import type { DeviceContext } from "../../model/shown";
 import { type Translate, useTexts } from "../../texts/texts";
-import { entriesOf } from "../../ui/reading";
+import { entriesOf, useReading } from "../../ui/reading";
 import { PMC, PMM } from "../overview/layout";
 import classes from "./Errors.module.css";
 import { errorIn, piecesOf } from "./errorMemory";
@@ -23,6 +23,7 @@ interface Props {
 /** What an error code tells: what the device has seen, what it does about it, and what a person does first. */
 export function ErrorAid({ code, context, partner, warning = false }: Props) {
   const t = useTexts();
+  useReading(context, FAULT_REACTION, "slow"); // rendered anew when it changes: the reaction tells what it holds
   const error = errorIn(context.doc, code);
   const details = { number: error?.number ?? null };
   const cause = error?.cause_key == null ? t("page.aid.no_cause") : t(error.cause_key, details);
