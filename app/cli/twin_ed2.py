@@ -12,6 +12,7 @@ from app.cli.output import Output
 from app.cli.runtime import spare_collector, stop_event
 from app.errors import BusOpenError, UsageError
 from app.model.description_file import load_builtin
+from app.model.slaves import ORDERS
 from app.twins.ed2.delivered import ANALOG, INCREMENTAL, SSI_BINARY, SSI_GRAY
 from app.twins.ed2.device import ADDRESS, OWN_BENCH, Ed2, Settings
 from app.twins.ed2.faults import KINDS, FaultPlan, parse_order
@@ -19,7 +20,7 @@ from app.twins.ed2.scenario import load_scenario
 from app.twins.ed2.segment import BAUD_RATES, Segment
 from app.twins.paced_thread import PacedThread
 from app.wire.profibus.fdl import MAX_ADDRESS
-from app.wire.profibus.pzd import First, Order
+from app.wire.profibus.order_proof import read_order
 
 if TYPE_CHECKING:
     from app.twins.ed2.pty_line import PtyLine
@@ -31,8 +32,6 @@ TRANSDUCERS: Final = {
     "ssi-gray": SSI_GRAY,
     "analog": ANALOG,
 }
-ORDERS: Final = {f"{byte.value}-{word.value}": Order(byte, word) for byte in First for word in First}
-"""Order of bytes in a word and of words in a double word of the process data: which end comes first."""
 BAUD: Final = 500_000
 BENCHES: Final = {"free": OWN_BENCH, "linked": replace(OWN_BENCH, link_n_mm=500.0)}
 """What both cylinders move: each its own load, or one thing that gives way by a millimetre for 500 N."""
@@ -115,7 +114,7 @@ def _settings(arguments: argparse.Namespace, address: int) -> Settings:
     return Settings(
         address=address,
         transducer=TRANSDUCERS[arguments.transducer],
-        order=ORDERS[arguments.pzd_order],
+        order=read_order(arguments.pzd_order),
         state=arguments.state,
         bench=BENCHES[arguments.bench],
     )

@@ -150,10 +150,10 @@ class ProfibusDriver:
         return DriverStatus(self.bus, line.state, line.since_ns, line.reason, 0, line.reconnects, ())
 
     def says_twin(self, node: int) -> bool | None:
-        """See Driver. By its ident number, which it tells whenever it is probed."""
+        """See Driver. By its ident number, as it was told last."""
         station = self._line.stations.get(node)
-        probed = None if station is None else station.probed
-        return None if probed is None else is_twin(probed)
+        diagnosis = None if station is None else station.diagnosis
+        return None if diagnosis is None else diagnosis.ident == TWIN_IDENT
 
     @property
     def problem(self) -> HubsideError | None:
@@ -247,11 +247,6 @@ class ProfibusDriver:
             return OrderStanding(True, "profibus.order.proven")
         check = await self.check_order(node)
         return OrderStanding(check.proven is not None, check.reason_key)
-
-    async def is_twin(self, node: int) -> bool:
-        """The station says by its ident number that it is simulated. Raises BusLostError."""
-        diagnosis = (await self.view(node)).diagnosis
-        return diagnosis is not None and diagnosis.ident == TWIN_IDENT
 
     async def view(self, node: int) -> StationView:
         """Where the station at ``node`` is, and its process data. Raises BusLostError."""

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 from app.errors import UsageError
 from app.model.description import Bus, Description
 from app.model.description_file import load_builtin
 from app.model.site import MAX_NODE
-from app.wire.profibus.fdl import MAX_ADDRESS
 from app.wire.profibus.order_proof import order_text, read_order
 from app.wire.profibus.pzd import Order
 
@@ -19,7 +18,6 @@ ServerTable = Mapping[NodeKey, str]
 """``host:port`` of the nodes of Modbus TCP buses."""
 OrderTable = Mapping[NodeKey, Order]
 """What a site says of the process data of nodes on PROFIBUS."""
-_MOST: Final = {**MAX_NODE, Bus.PROFIBUS_DP: MAX_ADDRESS}
 
 
 class NodeName(NamedTuple):
@@ -48,7 +46,7 @@ def described(table: Mapping[str, str]) -> dict[NodeKey, Description]:
             description = load_builtin(name.description_id)
         except UsageError:
             continue
-        if 1 <= node <= _MOST.get(description.bus, 0):
+        if 1 <= node <= MAX_NODE[description.bus]:
             found[bus, node] = description
     return found
 

@@ -16,7 +16,7 @@ from app.model.site import BusConfig, Device, Turbine
 from app.model.slaves import port_of
 from app.service.options import Options
 from app.wire.frame import Stamper
-from app.wire.profibus.pzd import First, Order
+from app.wire.profibus.order_proof import read_order
 
 
 def bitrate_of(config: BusConfig) -> int:
@@ -59,5 +59,5 @@ def _line(config: BusConfig, turbine: Turbine, folder: Path | None) -> ProfibusC
 def _station(device: Device, folder: Path | None) -> ProfibusStation:
     setup = device.slave
     gsd = (folder or Path()) / setup.gsd if setup.gsd else None
-    order = Order(*map(First, setup.pzd_order.split("-"))) if setup.pzd_order else None
+    order = read_order(setup.pzd_order) if setup.pzd_order else None
     return ProfibusStation(device.node, setup.telegram, gsd, setup.modules, order)

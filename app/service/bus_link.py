@@ -136,11 +136,6 @@ class BusLink(BusFeed):
         standing: OrderStanding = await ask(node)
         return standing
 
-    async def tells_twin(self, node: int) -> bool:
-        """A station without a name says by its ident number that it is simulated; False where none can."""
-        ask = getattr(self.driver, "is_twin", None)
-        return ask is not None and bool(await ask(node))
-
     @property
     def has_pdos(self) -> bool:
         """Commands go at once by PDO there, and devices can watch our heartbeat: CAN. Else they are written."""

@@ -26,6 +26,7 @@ _OVER: Final = 0.02
 """By such a share of the stroke a rod may be beyond its end before a longer one is drawn."""
 _SEVERITY: Final[Mapping[str, int]] = {"idle": 0, "enabled": 1, "warning": 2, "fault": 3}
 UnitName = Literal["mm", "in", "°", ""]
+_UNITS: Final[Mapping[str, UnitName]] = {"mm": "mm", "in": "in", DEGREE: "°"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -203,7 +204,7 @@ class _Seen:
         scaled = to_scaled(entry, decode(entry, view.reading.data), target.lookup)
         if scaled is None:
             return None, ""
-        unit: UnitName = scaled.unit if scaled.unit in ("mm", "in", DEGREE) else ""  # type: ignore[assignment]
+        unit = _UNITS.get(scaled.unit, "")
         return round(float(scaled.number), 4), unit
 
     def _limits(self) -> tuple[float, float] | None:

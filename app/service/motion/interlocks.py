@@ -167,8 +167,9 @@ async def _without_watch(connection: Connection, target: Target, confirmed: Conf
 
 async def _is_twin(connection: Connection, target: Target) -> bool:
     """What it answers now counts: another device may stand behind the address since it was asked last."""
-    if DEVICE_NAME not in target.description.entries:
-        return await connection.buses[target.device.bus].tells_twin(target.node)
+    by_bus = connection.buses[target.device.bus].says_twin(target.node)
+    if by_bus is not None or DEVICE_NAME not in target.description.entries:
+        return by_bus is True
     try:
         name = await connection.driver(target).read(target.node, DEVICE_NAME, ASK_TIMEOUT_S)
     except HubsideError:

@@ -14,6 +14,7 @@ from app.errors import RecordingError
 from app.model.description import Bus
 from app.model.servers import MODBUS
 from app.model.site import BusConfig, Device, Station, Turbine
+from app.model.slaves import PROFIBUS
 from app.recording.content import Event, Keyframe
 from app.recording.index import Mark, NearFrames, RecordingIndex, marks_of, open_index
 from app.recording.node_table import read_nodes
@@ -27,8 +28,6 @@ WINDOW_NS: Final = 16_000_000_000
 KEYFRAME_EVERY_NS: Final = 6_000_000_000
 """A recording of ours has a keyframe at least as often."""
 _USUAL_BITRATE: Final = 500_000
-_PROFIBUS: Final = "profibus:"
-"""The connection of a PROFIBUS line; of a recording no port is known."""
 _LOOK_BACK: Final = (KEYFRAME_EVERY_NS, 60_000_000_000, None)
 
 
@@ -146,7 +145,8 @@ def turbine_of(recording: Recording, known: Mapping[str, Turbine]) -> Turbine:
 def _config(bus: str, kind: Bus | None, bitrate: int) -> BusConfig:
     if kind is Bus.MODBUS_TCP:
         return BusConfig(bus, MODBUS, 0)
-    return BusConfig(bus, _PROFIBUS if kind is Bus.PROFIBUS_DP else "", bitrate)
+    # Of a recorded line no port is known.
+    return BusConfig(bus, PROFIBUS if kind is Bus.PROFIBUS_DP else "", bitrate)
 
 
 def _station(slug: str, devices: list[Device], named: Turbine | None) -> Station:

@@ -1,7 +1,7 @@
 import { TextInput } from "@mantine/core";
 import type { SiteDevice } from "../../api/settings";
-import { NeedsRole } from "../../frame/NeedsRole";
 import { useTexts } from "../../texts/texts";
+import { ExternalStop } from "./ExternalStop";
 import { useFlaw } from "./flaws";
 import classes from "./Settings.module.css";
 
@@ -16,7 +16,6 @@ interface Props {
 export function AddressRow({ at, device, onChange }: Props) {
   const t = useTexts();
   const addressFlaw = useFlaw(`${at}.address`);
-  const stopFlaw = useFlaw(`${at}.external_stop`);
   return (
     <tr data-testid={`address-of-${device.slug}`}>
       <td colSpan={6} style={{ paddingLeft: 0, borderTop: "none", paddingTop: 0 }}>
@@ -29,21 +28,7 @@ export function AddressRow({ at, device, onChange }: Props) {
             onChange={(event) => onChange({ ...device, address: event.currentTarget.value })}
             data-testid="device-address"
           />
-          <NeedsRole role="expert">
-            {(locked) => (
-              <TextInput
-                w={310}
-                label={t("page.settings.modbus.external_stop")}
-                placeholder={t("page.settings.modbus.external_stop_none")}
-                value={device.external_stop}
-                error={stopFlaw}
-                disabled={locked}
-                maxLength={200}
-                onChange={(event) => onChange({ ...device, external_stop: event.currentTarget.value })}
-                data-testid="external-stop"
-              />
-            )}
-          </NeedsRole>
+          <ExternalStop at={at} device={device} onChange={onChange} />
           <p className={classes.places} style={{ flex: "1 1 300px", paddingTop: 4 }}>
             {t("page.settings.modbus.external_stop_explain")}
           </p>

@@ -1,7 +1,7 @@
 import { Select, TagsInput, TextInput } from "@mantine/core";
 import type { SiteDevice } from "../../api/settings";
-import { NeedsRole } from "../../frame/NeedsRole";
 import { useTexts } from "../../texts/texts";
+import { ExternalStop } from "./ExternalStop";
 import { useFlaw } from "./flaws";
 import { ORDERS, TELEGRAMS } from "./profibusDraft";
 import classes from "./Settings.module.css";
@@ -21,7 +21,6 @@ export function SlaveRow({ at, device, onChange }: Props) {
   const t = useTexts();
   const gsdFlaw = useFlaw(`${at}.gsd`);
   const modulesFlaw = useFlaw(`${at}.modules`);
-  const stopFlaw = useFlaw(`${at}.external_stop`);
   return (
     <tr data-testid={`slave-${device.slug}`}>
       <td colSpan={6} style={{ paddingLeft: 0, borderTop: "none", paddingTop: 0 }}>
@@ -71,21 +70,7 @@ export function SlaveRow({ at, device, onChange }: Props) {
             onChange={(modules) => onChange({ ...device, modules })}
             data-testid="device-modules"
           />
-          <NeedsRole role="expert">
-            {(locked) => (
-              <TextInput
-                w={310}
-                label={t("page.settings.modbus.external_stop")}
-                placeholder={t("page.settings.modbus.external_stop_none")}
-                value={device.external_stop}
-                error={stopFlaw}
-                disabled={locked}
-                maxLength={200}
-                onChange={(event) => onChange({ ...device, external_stop: event.currentTarget.value })}
-                data-testid="external-stop"
-              />
-            )}
-          </NeedsRole>
+          <ExternalStop at={at} device={device} onChange={onChange} />
           <p className={classes.places} style={{ flex: "1 1 300px", paddingTop: 4 }}>
             {t("lines.site.slave_explain")}
           </p>
