@@ -256,13 +256,8 @@ async def test_no_bit_of_the_controlword_before_the_order_is_proven(bench: Cylin
 
 async def test_a_real_device_needs_a_stop_by_hand_that_an_expert_answers_for(bench: Cylinders, tmp_path: Path) -> None:
     more = ', pzd_order = "high-high", external_stop = "red button at the bench"'
+    bench.wired.do(lambda: setattr(bench.wired.device.slave, "ident", 0x1234))  # that of no twin of ours
     async with ed2_connection(bench, tmp_path, more) as connection, at_the_desk(connection) as (desk, page):
-        driver = connection.driver(connection.target(AXIS))
-
-        async def real(node: int) -> bool:
-            return False
-
-        driver.is_twin = real  # the twin has no other ident number
         page.hold()
         with pytest.raises(InterlockError) as refused:
             await desk.prepare(AXIS, page.fence)
@@ -275,16 +270,19 @@ async def test_a_real_device_needs_a_stop_by_hand_that_an_expert_answers_for(ben
 
 
 async def test_a_travel_window_without_a_way_is_never_enabled(bench: Cylinders, connection: Connection) -> None:
-    driver = connection.driver(connection.target(AXIS))
-    await driver.write(NODE, ip(1, 106), b"\x01")
+    """Where nobody has told of it, it is found as the axis is enabled; from then on a rule holds the axis back."""
     async with at_the_desk(connection) as (desk, page):
         await prepared(desk, page)
-        for order in (drive_by_hand(desk, AXIS, page.fence, CREEP), hold(desk, AXIS, page.fence)):
+        bench.wired.do(lambda: bench.wired.device.channels[0].put(1, 106, 1))
+        for order, interlock in (
+            (drive_by_hand(desk, AXIS, page.fence, CREEP), "travel_window"),
+            (hold(desk, AXIS, page.fence), "rules"),
+        ):
             page.let_go()
             page.hold()
             with pytest.raises(InterlockError) as refused:
                 await order
-            assert refused.value.details["interlock"] == "travel_window"
+            assert refused.value.details["interlock"] == interlock
             assert bench.state in (State.INIT, State.DISABLED)
         assert bench.places_mm[0] == pytest.approx(START_MM, abs=0.1)
 
