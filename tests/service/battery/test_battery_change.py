@@ -16,6 +16,7 @@ from app.service.gate import Block, Blocks, Place
 from app.service.journal import Kind
 from app.store.store import Store
 from app.twins.line import Fault, drop
+from tests.e2e.test_interoperation import until
 from tests.service.battery.rig import NODE, PMM, asks, at_the_batteries, charged, in_plant, witness, writes
 from tests.service.conftest import Served
 
@@ -40,6 +41,7 @@ async def counted(served: Served, connection: Connection) -> Served:
     in_plant(served, charged(0.98))
     with witness(served) as unit:
         unit.sdo[0x3050].raw = COUNTED_MAH
+    await until(lambda: Kind.FOREIGN_WRITTEN in [entry.kind for entry in connection.journal.latest()])
     return served
 
 
